@@ -1,0 +1,115 @@
+"""cartctl: redundancy resolution for robots, on Pinocchio.
+
+Robots come from URDF; tasks and limits at a state become one algebraic problem; any of the field's methods answers it;
+the answer becomes a command. ``import cartctl.solvers`` works without Pinocchio: the names below are imported when
+they are first used.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+__version__ = "0.1.0"
+
+_HOMES = {
+    "cartctl.errors": ("CartctlError", "CartctlWarning", "RunInterrupted"),
+    "cartctl.algebra.problem": ("Equation", "Problem"),
+    "cartctl.algebra.solution": ("Solution", "Status"),
+    "cartctl.algebra.inverses": ("Damped", "InversePolicy", "Truncated"),
+    "cartctl.solvers": ("EquationSolver", "Solver", "solve", "solvers"),
+    "cartctl.solvers.pinv": ("Pinv",),
+    "cartctl.solvers.dls": ("DLS",),
+    "cartctl.solvers.projected_gradient": ("ProjectedGradient",),
+    "cartctl.solvers.task_priority": ("TaskPriority",),
+    "cartctl.model.library": ("robots",),
+    "cartctl.model.limits": ("Limits",),
+    "cartctl.model.loading": ("load", "planar"),
+    "cartctl.model.robot": ("Robot",),
+    "cartctl.model.state": ("State",),
+    "cartctl.tasks": (
+        "ComTask",
+        "FrameTask",
+        "FunctionTask",
+        "JointTask",
+        "PostureTask",
+        "Reference",
+        "RelativeFrameTask",
+        "Task",
+    ),
+    "cartctl.objectives": ("JointRange", "Objective"),
+    "cartctl.levels": ("Command", "levels"),
+    "cartctl.motion.controller": ("Controller",),
+    "cartctl.motion.simulate": ("simulate",),
+    "cartctl.motion.run": ("Run", "TaskRecord"),
+    "cartctl.motion.metrics": ("JointMetrics", "Metrics", "TaskMetrics"),
+    "cartctl.paths": ("Circle", "Ellipse", "Line", "Lissajous", "Path", "PathSample", "Polygon", "Waypoints"),
+}
+_HOME_OF = {name: module for module, names in _HOMES.items() for name in names}
+
+__all__ = ["__version__", *sorted(_HOME_OF)]  # noqa: PLE0604 - names, from the table above
+
+if TYPE_CHECKING:  # editors and mypy see what __getattr__ finds
+    from cartctl.algebra.inverses import Damped as Damped
+    from cartctl.algebra.inverses import InversePolicy as InversePolicy
+    from cartctl.algebra.inverses import Truncated as Truncated
+    from cartctl.algebra.problem import Equation as Equation
+    from cartctl.algebra.problem import Problem as Problem
+    from cartctl.algebra.solution import Solution as Solution
+    from cartctl.algebra.solution import Status as Status
+    from cartctl.errors import CartctlError as CartctlError
+    from cartctl.errors import CartctlWarning as CartctlWarning
+    from cartctl.errors import RunInterrupted as RunInterrupted
+    from cartctl.levels import Command as Command
+    from cartctl.levels import levels as levels
+    from cartctl.model.library import robots as robots
+    from cartctl.model.limits import Limits as Limits
+    from cartctl.model.loading import load as load
+    from cartctl.model.loading import planar as planar
+    from cartctl.model.robot import Robot as Robot
+    from cartctl.model.state import State as State
+    from cartctl.motion.controller import Controller as Controller
+    from cartctl.motion.metrics import JointMetrics as JointMetrics
+    from cartctl.motion.metrics import Metrics as Metrics
+    from cartctl.motion.metrics import TaskMetrics as TaskMetrics
+    from cartctl.motion.run import Run as Run
+    from cartctl.motion.run import TaskRecord as TaskRecord
+    from cartctl.motion.simulate import simulate as simulate
+    from cartctl.objectives import JointRange as JointRange
+    from cartctl.objectives import Objective as Objective
+    from cartctl.paths import Circle as Circle
+    from cartctl.paths import Ellipse as Ellipse
+    from cartctl.paths import Line as Line
+    from cartctl.paths import Lissajous as Lissajous
+    from cartctl.paths import Path as Path
+    from cartctl.paths import PathSample as PathSample
+    from cartctl.paths import Polygon as Polygon
+    from cartctl.paths import Waypoints as Waypoints
+    from cartctl.solvers import EquationSolver as EquationSolver
+    from cartctl.solvers import Solver as Solver
+    from cartctl.solvers import solve as solve
+    from cartctl.solvers import solvers as solvers
+    from cartctl.solvers.dls import DLS as DLS
+    from cartctl.solvers.pinv import Pinv as Pinv
+    from cartctl.solvers.projected_gradient import ProjectedGradient as ProjectedGradient
+    from cartctl.solvers.task_priority import TaskPriority as TaskPriority
+    from cartctl.tasks import ComTask as ComTask
+    from cartctl.tasks import FrameTask as FrameTask
+    from cartctl.tasks import FunctionTask as FunctionTask
+    from cartctl.tasks import JointTask as JointTask
+    from cartctl.tasks import PostureTask as PostureTask
+    from cartctl.tasks import Reference as Reference
+    from cartctl.tasks import RelativeFrameTask as RelativeFrameTask
+    from cartctl.tasks import Task as Task
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOME_OF:
+        raise AttributeError(f"module 'cartctl' has no attribute {name!r}")
+    value = getattr(import_module(_HOME_OF[name]), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted(set(globals()) | set(__all__))

@@ -1,0 +1,36 @@
+"""Null spaces as orthonormal bases, ranks, and projectors made of them.
+
+A basis Z with Z^T Z = I keeps ``A Z = 0`` to round-off however often it is narrowed; the recursion
+``P_k = P_{k-1} - (A_k P_{k-1})# A_k P_{k-1}`` on matrices does not.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cartctl.algebra.svd import SVD, numerical_rank, round_off, svd
+from cartctl.checks import FloatArray
+
+
+def null_part(decomposition: SVD, floor: float, u0: FloatArray) -> FloatArray:
+    """``(I - A# A) u0``, (n,): what of u0 does not move the task."""
+    rank = numerical_rank(decomposition.s, floor)
+    n = decomposition.Vt.shape[1]
+    if 2 * rank > n:  # the smaller of the two bases is the cheaper and the cleaner one
+        Z = decomposition.Vt[rank:]
+        return Z.T @ (Z @ u0)  # type: ignore[no-any-return]
+    R = decomposition.Vt[:rank]
+    part = u0 - R.T @ (R @ u0)
+    return part - R.T @ (R @ part)  # type: ignore[no-any-return]
+
+
+def basis(A: FloatArray) -> FloatArray:
+    """An orthonormal basis (n, n - rank) of the null space of A (m, n)."""
+    decomposition = svd(np.asfortranarray(A, dtype=np.float64))
+    return decomposition.Vt[numerical_rank(decomposition.s, round_off(A)) :].T  # type: ignore[no-any-return]
+
+
+def projector(A: FloatArray) -> FloatArray:
+    """``I - A# A``, (n, n): the orthogonal projector onto the null space of A (m, n)."""
+    Z = basis(A)
+    return Z @ Z.T  # type: ignore[no-any-return]

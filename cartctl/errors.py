@@ -1,0 +1,127 @@
+"""Every way cartctl refuses bad input, each under its own name.
+
+Misuse raises a child of :class:`CartctlError` whose message names the offending thing, its value, what was
+expected and what to do. Numerical trouble (a singularity, a conflict) is a status of a Solution instead.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from difflib import get_close_matches
+
+
+class CartctlError(Exception):
+    """Root of all errors raised on purpose by cartctl; the message is one readable line."""
+
+
+class CartctlWarning(UserWarning):
+    """Something was left out that the caller may have counted on (meshes, limits)."""
+
+
+class ShapeError(CartctlError, ValueError):
+    """An array has the wrong shape."""
+
+
+class NonFiniteError(CartctlError, ValueError):
+    """An array or number holds NaN or infinity."""
+
+
+class MetricError(CartctlError, ValueError):
+    """A metric is not symmetric positive definite."""
+
+
+class ProblemError(CartctlError, ValueError):
+    """A Problem contradicts itself: crossed bounds, an unknown fit, a negative weight, an empty task list."""
+
+
+class UnsupportedProblem(CartctlError, ValueError):  # noqa: N818 - the public name
+    """The chosen solver cannot honour something in the problem, and says so instead of ignoring it."""
+
+
+class ParameterError(CartctlError, ValueError):
+    """A parameter lies outside its domain: a negative gain, dt <= 0, an unknown option."""
+
+
+class TargetError(CartctlError, ValueError):
+    """A task's target is missing or of the wrong kind."""
+
+
+class PathError(CartctlError, ValueError):
+    """A path is ill-defined: zero length, a non-positive duration, too few waypoints."""
+
+
+class ConfigurationError(CartctlError, ValueError):
+    """A configuration q is not one of the robot's: a quaternion or a (cos, sin) pair without unit norm."""
+
+
+class UrdfError(CartctlError, ValueError):
+    """A URDF cannot be read, holds no joints, or reaches outside the folders it was given."""
+
+
+class RunFileError(CartctlError, ValueError):
+    """A saved run cannot be read."""
+
+
+class MissingDependencyError(CartctlError, ImportError):
+    """A package is missing; the message holds the command that installs it."""
+
+
+class LookupFailure(CartctlError, KeyError):  # noqa: N818 - an intermediate base, its children carry the names
+    """A name is unknown; the closest known names are offered."""
+
+    kind = "name"
+
+    def __init__(self, name: object, known: Iterable[str], advice: str = "") -> None:
+        known = list(known)
+        close = get_close_matches(str(name), known, n=3, cutoff=0.5) or _containing(str(name), known)
+        if close:
+            offer = "did you mean " + " or ".join(repr(c) for c in close) + "?"
+        else:
+            offer = "known: " + ", ".join(known[:12]) + (", ..." if len(known) > 12 else "")
+        super().__init__(f"unknown {self.kind} {name!r}; {offer}" + (f" {advice}" if advice else ""))
+        self.name, self.close = name, close
+
+    def __str__(self) -> str:  # KeyError would print the repr
+        return str(self.args[0])
+
+
+class RobotNotFound(LookupFailure):
+    """No robot of that name, and no such file."""
+
+    kind = "robot"
+
+
+class FrameNotFound(LookupFailure):
+    """The robot has no frame of that name."""
+
+    kind = "frame"
+
+
+class JointNotFound(LookupFailure):
+    """The robot has no (active) joint of that name."""
+
+    kind = "joint"
+
+
+class SolverNotFound(LookupFailure):
+    """No solver is registered under that name."""
+
+    kind = "solver"
+
+
+class LevelNotFound(LookupFailure):
+    """No level of that name."""
+
+    kind = "level"
+
+
+class RunInterrupted(KeyboardInterrupt):  # noqa: N818 - it is an interrupt, not an error
+    """Ctrl-C during a rollout; ``.run`` holds every step made so far."""
+
+    def __init__(self, run: object) -> None:
+        super().__init__("interrupted")
+        self.run = run
+
+
+def _containing(name: str, known: list[str]) -> list[str]:
+    return [k for k in known if name and name.lower() in k.lower()][:3]

@@ -1,0 +1,100 @@
+"""Compiled kernels: plain array functions in the subset numba compiles, compiled when first used, cached on disk.
+
+A kernel stays in the file of its method, decorated with :func:`kernel`; importing it does not import numba. The cache
+folder is keyed by a hash of the package's sources, because numba's own key misses changes in a callee of another
+file. With ``NUMBA_DISABLE_JIT=1`` the same functions run as Python.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import logging
+import os
+import shutil
+from collections.abc import Callable
+from functools import lru_cache
+from pathlib import Path
+from typing import Any, Generic, ParamSpec, TypeVar
+
+from platformdirs import user_cache_path
+
+P = ParamSpec("P")
+R = TypeVar("R")
+
+_KEPT_CACHES = 4
+_log = logging.getLogger("cartctl")
+
+
+class Kernel(Generic[P, R]):
+    """A function that compiles itself at its first call."""
+
+    def __init__(self, function: Callable[P, R]) -> None:
+        self.function = function
+        self.__doc__ = function.__doc__
+        self.__name__ = function.__name__
+
+    def __call__(self, *args: P.args, **kwargs: P.kwargs) -> R:
+        """Call the compiled function."""
+        return self.compiled(*args, **kwargs)
+
+    @property
+    def compiled(self) -> Callable[P, R]:
+        """The compiled function itself; hot loops hold on to it."""
+        try:
+            return self._compiled
+        except AttributeError:
+            self._compiled: Callable[P, R] = _compile(self.function)
+            return self._compiled
+
+
+def kernel(function: Callable[P, R]) -> Kernel[P, R]:
+    """Mark ``function`` as a kernel."""
+    return Kernel(function)
+
+
+def _compile(function: Callable[P, R]) -> Callable[P, R]:
+    import numba
+
+    folder = _cache_folder()
+    if folder is None:
+        return numba.njit(function)  # type: ignore[no-any-return]
+    # numba reads the folder while it decorates; the setting is global, so it is put back for the caller's own functions
+    before = numba.config.CACHE_DIR
+    numba.config.CACHE_DIR = str(folder)
+    try:
+        return numba.njit(cache=True)(function)  # type: ignore[no-any-return]
+    finally:
+        numba.config.CACHE_DIR = before
+
+
+@lru_cache(maxsize=1)
+def _cache_folder() -> Path | None:
+    """Where compiled kernels are kept, or None where nothing can be written."""
+    root = Path(os.environ.get("CARTCTL_CACHE_DIR") or user_cache_path("cartctl")) / "kernels"
+    folder = root / _source_hash()
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        os.utime(folder)
+        if not os.access(folder, os.W_OK):
+            raise PermissionError(folder)
+    except OSError as error:
+        _log.info("kernels are compiled anew in every process: %s", error)
+        return None
+    _prune(root)
+    return folder
+
+
+def _source_hash() -> str:
+    digest = hashlib.sha256()
+    package = Path(__file__).parent
+    for source in sorted(package.rglob("*.py")):
+        digest.update(str(source.relative_to(package)).encode())
+        digest.update(source.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+def _prune(root: Path) -> None:
+    """Remove all but the caches used last."""
+    caches: list[Any] = sorted(root.iterdir(), key=lambda folder: folder.stat().st_mtime, reverse=True)
+    for folder in caches[_KEPT_CACHES:]:
+        shutil.rmtree(folder, ignore_errors=True)

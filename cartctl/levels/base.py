@@ -1,0 +1,68 @@
+"""What a level is: it turns tasks at a state into one Problem, and its Solution back into a command."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from typing import Any, ClassVar
+
+from cartctl.algebra.problem import Problem
+from cartctl.algebra.solution import Solution
+from cartctl.checks import FloatArray, is_finite
+from cartctl.errors import NonFiniteError
+from cartctl.model.state import State
+from cartctl.objectives.base import Objective
+from cartctl.tasks.base import Reference, Task
+
+
+class Command:
+    """What a controller says: velocity (nv,), acceleration (nv,) or torque (nv,), None where the level has none.
+
+    solution: the Solution behind it. references: each task's error and target rates at this step.
+    """
+
+    __slots__ = ("acceleration", "references", "solution", "torque", "velocity")
+
+    def __init__(
+        self,
+        solution: Solution,
+        references: Sequence[Reference],
+        velocity: FloatArray | None = None,
+        acceleration: FloatArray | None = None,
+        torque: FloatArray | None = None,
+    ) -> None:
+        self.solution = solution
+        self.references = references
+        self.velocity = velocity
+        self.acceleration = acceleration
+        self.torque = torque
+
+
+class Level(ABC):
+    """Velocity, acceleration or torque: what u is, and what A and b are made of."""
+
+    name: ClassVar[str]
+    shapes_limits: ClassVar[bool] = False  # whether ``problem`` turns a robot's limits into bounds on u
+
+    @abstractmethod
+    def problem(
+        self,
+        state: State,
+        tasks: Sequence[Task],
+        t: float,
+        anchors: Sequence[Any],
+        objective: Objective | None,
+        metric: FloatArray | None,
+    ) -> tuple[Problem, list[Reference]]:
+        """The problem of this instant, and the references it was made from; raises NonFiniteError."""
+
+    @abstractmethod
+    def command(self, solution: Solution, references: Sequence[Reference]) -> Command:
+        """The command that the answer means."""
+
+
+def require_finite(array: FloatArray, what: str) -> FloatArray:
+    """``array``, or NonFiniteError naming ``what``: a target or function of the user's went astray."""
+    if not is_finite(array.ravel()):
+        raise NonFiniteError(f"{what} holds nan or inf: {array}; expected finite numbers")
+    return array

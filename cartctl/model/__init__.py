@@ -1,0 +1,1 @@
+"""The robot as data: URDF, limits, states. Knows no solver."""

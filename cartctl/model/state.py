@@ -1,0 +1,173 @@
+"""Everything Pinocchio computes at one state (q, v), each thing at most once and only when asked for."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pinocchio as pin
+
+from cartctl.checks import FloatArray
+
+if TYPE_CHECKING:
+    from cartctl.model.robot import Robot
+
+_WORLD_ALIGNED = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+_joint_jacobians = pin.computeJointJacobians
+_frame_jacobian = pin.getFrameJacobian
+_place_frame = pin.updateFramePlacement
+
+
+class State:
+    """A robot at configuration q (nq,) and velocity v (nv,), with its own Pinocchio data.
+
+    Frame quantities are in LOCAL_WORLD_ALIGNED axes (origin at the frame, axes of the world), linear part first.
+    Arrays handed out are read-only and stay valid for good. Made by :meth:`cartctl.Robot.state`, which checks q and v;
+    raises FrameNotFound for an unknown frame.
+    """
+
+    __slots__ = (
+        "_accelerated",
+        "_cache",
+        "_data",
+        "_frames",
+        "_kinematics",
+        "_model",
+        "_stamp",
+        "q",
+        "robot",
+        "v",
+    )
+
+    def __init__(self, robot: Robot) -> None:
+        self.robot = robot
+        self._model = robot.model
+        self._data = robot.model.createData()
+        self._frames: dict[str, FrameView] = {}
+        self._stamp = 0
+        self.set(robot.neutral, np.zeros(robot.nv))
+
+    def set(self, q: FloatArray, v: FloatArray) -> None:
+        """Move to (q, v), already checked, and forget all that was computed; for loops that own their state."""
+        self.q = q
+        self.v = v
+        self._stamp += 1
+        self._kinematics = False
+        self._accelerated = False
+        self._cache: dict[str, FloatArray] = {}
+
+    def place(self, frame: str) -> FrameView:
+        """Views of ``frame``'s pose that change with the next ``set``; :meth:`placement` copies."""
+        view = self._frames.get(frame)
+        if view is None:
+            view = self._frames[frame] = FrameView(self._data, self.robot.frame_id(frame))
+        if view.placed != self._stamp:
+            if not self._kinematics:
+                _joint_jacobians(self._model, self._data, self.q)
+                self._kinematics = True
+            _place_frame(self._model, self._data, view.fid)
+            view.placed = self._stamp
+        return view
+
+    def placement(self, frame: str) -> pin.SE3:
+        """The pose of ``frame`` in the world."""
+        return self.place(frame).pose.copy()
+
+    def position(self, frame: str) -> FloatArray:
+        """The origin of ``frame`` in the world, (3,), m."""
+        return np.array(self.place(frame).translation)
+
+    def rotation(self, frame: str) -> FloatArray:
+        """The axes of ``frame`` in the world as columns, (3, 3)."""
+        return np.array(self.place(frame).rotation)
+
+    def jacobian(self, frame: str) -> FloatArray:
+        """``J`` (6, nv): twist of ``frame`` = J v."""
+        view = self.place(frame)
+        if view.differentiated != self._stamp:
+            J = _frame_jacobian(self._model, self._data, view.fid, _WORLD_ALIGNED)
+            J.flags.writeable = False
+            view.jacobian = J
+            view.differentiated = self._stamp
+        return view.jacobian
+
+    def twist(self, frame: str) -> FloatArray:
+        """``J v``, (6,), m/s and rad/s."""
+        return self.jacobian(frame) @ self.v
+
+    def drift(self, frame: str) -> FloatArray:
+        """``J_dot v``, (6,): the classical acceleration of ``frame`` at zero joint acceleration, m/s^2 and rad/s^2."""
+        key = "drift " + frame
+        if key not in self._cache:
+            fid = self.robot.frame_id(frame)
+            if not self._accelerated:
+                pin.forwardKinematics(self._model, self._data, self.q, self.v, np.zeros(self._model.nv))
+                self._accelerated = True
+            motion = pin.getFrameClassicalAcceleration(self._model, self._data, fid, _WORLD_ALIGNED)
+            self._cache[key] = _frozen(motion.vector)
+        return self._cache[key]
+
+    @property
+    def mass_matrix(self) -> FloatArray:
+        """``M(q)``, (nv, nv), symmetric."""
+        return self._once("M", lambda: _symmetric(pin.crba(self._model, self._data, self.q)))
+
+    @property
+    def nonlinear_effects(self) -> FloatArray:
+        """``h(q, v)``, (nv,): Coriolis, centrifugal and gravity torques, N m."""
+        return self._once("h", lambda: pin.nonLinearEffects(self._model, self._data, self.q, self.v))
+
+    @property
+    def gravity(self) -> FloatArray:
+        """``g(q)``, (nv,): gravity torques, N m."""
+        return self._once("g", lambda: pin.computeGeneralizedGravity(self._model, self._data, self.q))
+
+    @property
+    def com(self) -> FloatArray:
+        """The centre of mass in the world, (3,), m."""
+        return self._once("com", lambda: pin.centerOfMass(self._model, self._data, self.q))
+
+    @property
+    def com_jacobian(self) -> FloatArray:
+        """``J_com`` (3, nv): velocity of the centre of mass = J_com v."""
+        return self._once("J_com", lambda: pin.jacobianCenterOfMass(self._model, self._data, self.q))
+
+    @property
+    def com_drift(self) -> FloatArray:
+        """``J_com_dot v``, (3,): acceleration of the centre of mass at zero joint acceleration, m/s^2."""
+        return self._once("com drift", self._com_drift)
+
+    def _com_drift(self) -> Any:
+        pin.centerOfMass(self._model, self._data, self.q, self.v, np.zeros(self._model.nv))
+        return self._data.acom[0]
+
+    def _once(self, key: str, compute: Any) -> FloatArray:
+        if key not in self._cache:
+            self._cache[key] = _frozen(compute())
+        return self._cache[key]
+
+
+class FrameView:
+    """One frame inside a State's data: its pose as views of Pinocchio's memory, and its Jacobian."""
+
+    __slots__ = ("differentiated", "fid", "jacobian", "placed", "pose", "rotation", "translation")
+
+    def __init__(self, data: pin.Data, fid: int) -> None:
+        self.fid = fid
+        self.pose: pin.SE3 = data.oMf[fid]
+        self.translation: FloatArray = self.pose.translation
+        self.rotation: FloatArray = self.pose.rotation
+        self.jacobian: FloatArray = np.zeros((6, 0))
+        self.placed = self.differentiated = -1
+
+
+def _frozen(array: Any) -> FloatArray:
+    """A read-only copy: Pinocchio hands out views of memory that the next call overwrites."""
+    copy = np.array(array, dtype=np.float64)
+    copy.flags.writeable = False
+    return copy
+
+
+def _symmetric(M: FloatArray) -> FloatArray:
+    """Crba fills the upper triangle only."""
+    return np.triu(M) + np.triu(M, 1).T  # type: ignore[no-any-return]

@@ -1,0 +1,1 @@
+"""Closing the loop: controller, simulation, and the run that remembers it."""

@@ -1,0 +1,53 @@
+"""Runs as tables: one row a sample, for pandas, R, a spreadsheet."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.csv
+import pyarrow.parquet
+
+from cartctl.motion.run import Run
+
+
+def table(run: Run) -> pa.Table:
+    """A pyarrow Table; what belongs to a step is null in the row after the last one."""
+    columns: dict[str, Any] = {"time [s]": run.time}
+    columns |= {f"q{i}": run.q[:, i] for i in range(run.q.shape[1])}
+    joints = run.meta.get("joints") or [f"dof{i}" for i in range(run.v.shape[1])]
+    columns |= {f"v {name}": run.v[:, i] for i, name in enumerate(joints)}
+    columns |= {f"command {name}": _padded(run.command[:, i]) for i, name in enumerate(joints)}
+    for task in run.tasks:
+        for i, unit in enumerate(task.units):
+            columns[f"{task.name} error{i}" + (f" [{unit}]" if unit else "")] = task.error[:, i]
+        columns |= {f"{task.name} sigma{i}": task.singular_values[:, i] for i in range(task.singular_values.shape[1])}
+        columns[f"{task.name} scale"] = _padded(task.scale)
+        for label, poses in (("pose", task.pose), ("target", task.target)):
+            if poses is not None:
+                parts = ("x", "y", "z", "qx", "qy", "qz", "qw")[: poses.shape[1]]
+                columns |= {f"{task.name} {label} {part}": poses[:, i] for i, part in enumerate(parts)}
+    columns["status"] = [*run.status, None] if len(run.time) else []
+    columns["solve time [s]"] = _padded(run.solve_time)
+    return pa.table(columns)
+
+
+def to_csv(run: Run, path: Path) -> Path:
+    """Write the table as CSV."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    pyarrow.csv.write_csv(table(run), str(path))
+    return path
+
+
+def to_parquet(run: Run, path: Path) -> Path:
+    """Write the table as Parquet."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    pyarrow.parquet.write_table(table(run), str(path))
+    return path
+
+
+def _padded(values: Any) -> pa.Array:
+    """One value a step, and a null for the state after the last."""
+    return pa.concat_arrays([pa.array(np.asarray(values, dtype=np.float64)), pa.nulls(1, pa.float64())])

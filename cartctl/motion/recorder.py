@@ -1,0 +1,153 @@
+"""Writing down every step of a rollout, so that nothing is lost when it ends early."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import asdict, is_dataclass
+from datetime import datetime, timezone
+from importlib import metadata
+from typing import Any
+
+import numpy as np
+
+from cartctl.algebra.svd import singular_values
+from cartctl.checks import FloatArray
+from cartctl.levels import Command
+from cartctl.motion.controller import Controller
+from cartctl.motion.run import Run, TaskRecord
+
+
+class Recorder:
+    """Arrays for ``steps`` steps of one controller, filled as it goes."""
+
+    def __init__(self, controller: Controller, steps: int, t0: float) -> None:
+        robot = controller.robot
+        self.steps = steps
+        self._controller, self._t0 = controller, t0
+        self._made = 0
+        self._closed = False
+        self._q, self._v = np.zeros((steps + 1, robot.nq)), np.zeros((steps + 1, robot.nv))
+        self._command, self._spent = np.zeros((steps, robot.nv)), np.zeros(steps)
+        self._status: list[str] = []
+        self._tasks = [_TaskRows(len(task.units(robot)), robot.nv, steps) for task in controller.tasks]
+
+    def time_of(self, k: int) -> float:
+        """The time of step k in s; a product, so that it does not drift as a sum would."""
+        return self._t0 + k * self._controller.dt
+
+    def record(self, k: int, q: FloatArray, v: FloatArray, command: Command, spent: int) -> None:
+        """Step k: the state before it, the command, and the time it took in ns."""
+        self._q[k], self._v[k] = q, v
+        self._command[k], self._spent[k] = command.velocity, spent * 1e-9
+        self._status.append(command.solution.status.name)
+        solution, controller = command.solution, self._controller
+        for i, (rows, task) in enumerate(zip(self._tasks, controller.tasks, strict=True)):
+            rows.error[k] = command.references[i].error
+            rows.scale[k] = solution.scales[i]
+            rows.singular[k] = singular_values(np.asfortranarray(solution.problem.equations[i].A))
+            rows.see(k, task.observe(controller.observe(q, v), self.time_of(k), controller.anchors[i]))
+        self._made = k + 1
+
+    def close(self, q: FloatArray, v: FloatArray) -> None:
+        """The state after the last step."""
+        k, controller = self._made, self._controller
+        self._q[k], self._v[k] = q, v
+        t = self.time_of(k)
+        state = controller.observe(q, v, t)
+        for rows, task, anchor in zip(self._tasks, controller.tasks, controller.anchors, strict=True):
+            rows.error[k] = task.reference(state, t, anchor).error
+            rows.singular[k] = singular_values(np.asfortranarray(task.jacobian(state)))
+            rows.see(k, task.observe(state, t, anchor))
+        self._closed = True
+
+    def finish(self, *, interrupted: bool) -> Run:
+        """The Run of what was made."""
+        n = self._made if self._closed else max(self._made - 1, 0)
+        samples = n + 1 if self._made else 0
+        controller = self._controller
+        records = [
+            rows.record(task, controller.robot, n, samples)
+            for rows, task in zip(self._tasks, controller.tasks, strict=True)
+        ]
+        return Run(
+            meta=_meta(controller, interrupted),
+            time=self._t0 + controller.dt * np.arange(samples, dtype=np.float64),
+            q=self._q[:samples].copy(),
+            v=self._v[:samples].copy(),
+            command=self._command[:n].copy(),
+            status=self._status[:n],
+            solve_time=self._spent[:n].copy(),
+            tasks=records,
+            robot=controller.robot,
+        )
+
+
+class _TaskRows:
+    """One task's arrays."""
+
+    def __init__(self, m: int, nv: int, steps: int) -> None:
+        self.error = np.zeros((steps + 1, m))
+        self.scale = np.ones(steps)
+        self.singular = np.zeros((steps + 1, min(m, nv)))
+        self.value: FloatArray | None = None
+        self.target: FloatArray | None = None
+
+    def see(self, k: int, observation: Any) -> None:
+        if observation is None:
+            return
+        if self.value is None or self.target is None:
+            self.value = np.zeros((self.error.shape[0], len(observation.value)))
+            self.target = np.zeros_like(self.value)
+        self.value[k], self.target[k] = observation.value, observation.target
+
+    def record(self, task: Any, robot: Any, n: int, samples: int) -> TaskRecord:
+        return TaskRecord(
+            name=task.name,
+            kind=task.kind,
+            frame=task.frame,
+            units=task.units(robot),
+            error=self.error[:samples].copy(),
+            scale=self.scale[:n].copy(),
+            singular_values=self.singular[:samples].copy(),
+            pose=None if self.value is None else self.value[:samples].copy(),
+            target=None if self.target is None else self.target[:samples].copy(),
+        )
+
+
+def _meta(controller: Controller, interrupted: bool) -> dict[str, Any]:
+    solver, robot = controller.solver, controller.robot
+    period = [list(map(float, p.cycle_times())) for p in _paths(controller) if p.closed]
+    return {
+        "robot": robot.spec,
+        "robot_name": robot.name,
+        "joints": list(robot.dof_names),
+        "solver": solver.name,
+        "solver_parameters": _parameters(solver),
+        "level": controller.level.name,
+        "objective": None if controller.objective is None else repr(controller.objective),
+        "metric": controller.metric if isinstance(controller.metric, str) else type(controller.metric).__name__,
+        "dt": controller.dt,
+        "cycles": period[0] if period else [],
+        "interrupted": interrupted,
+        "date": datetime.now(timezone.utc).isoformat(timespec="seconds"),
+        "versions": {name: _version(name) for name in ("cartctl", "pin", "numpy", "scipy")}
+        | {"python": ".".join(map(str, sys.version_info[:3]))},
+    }
+
+
+def _paths(controller: Controller) -> list[Any]:
+    targets = (getattr(task, "target", None) for task in controller.tasks)
+    return [target for target in targets if hasattr(target, "cycle_times") and hasattr(target, "closed")]
+
+
+def _parameters(solver: Any) -> dict[str, str]:
+    return (
+        {k: str(v) for k, v in asdict(solver).items()} if is_dataclass(solver) and not isinstance(solver, type) else {}
+    )
+
+
+def _version(name: str) -> str:
+    try:
+        return metadata.version(name)
+    except metadata.PackageNotFoundError:
+        return "not installed"

@@ -1,0 +1,74 @@
+"""Runs as .npz files: arrays plus one JSON text, no pickles."""
+
+from __future__ import annotations
+
+import json
+import os
+import tempfile
+import zipfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from cartctl.errors import RunFileError
+from cartctl.motion.run import Run, TaskRecord
+
+_FORMAT = 1
+_ARRAYS = ("time", "q", "v", "command", "solve_time")
+_TASK_ARRAYS = ("error", "scale", "singular_values", "pose", "target")
+
+
+def save(run: Run, path: Path) -> Path:
+    """Write ``run``; the file appears whole or not at all."""
+    if path.suffix != ".npz":
+        path = path.with_name(path.name + ".npz")
+    path.parent.mkdir(parents=True, exist_ok=True)
+    arrays: dict[str, Any] = {name: getattr(run, name) for name in _ARRAYS}
+    names = sorted(set(run.status))
+    header: dict[str, Any] = {"format": _FORMAT, "meta": run.meta, "status": names, "tasks": []}
+    codes = {name: i for i, name in enumerate(names)}
+    arrays["status"] = np.array([codes[s] for s in run.status], dtype=np.int8)
+    for i, task in enumerate(run.tasks):
+        header["tasks"].append({"name": task.name, "kind": task.kind, "frame": task.frame, "units": task.units})
+        arrays.update({f"task{i}_{n}": getattr(task, n) for n in _TASK_ARRAYS if getattr(task, n) is not None})
+    arrays["header"] = np.array(json.dumps(header))
+    _write(path, arrays)
+    return path
+
+
+def load(path: Path) -> Run:
+    """Read a run; raises RunFileError for anything else."""
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            arrays = {name: file[name] for name in file.files}
+        header = json.loads(str(arrays["header"]))
+        if header["format"] != _FORMAT:
+            raise RunFileError(f"{path} has format {header['format']}; expected {_FORMAT}, as this version writes")
+        tasks = [_task(i, entry, arrays) for i, entry in enumerate(header["tasks"])]
+        status = [header["status"][code] for code in arrays["status"]]
+        return Run(meta=header["meta"], status=status, tasks=tasks, **{n: arrays[n] for n in _ARRAYS})
+    except FileNotFoundError:
+        raise RunFileError(f"{path}: no such file; expected a .npz written by Run.save") from None
+    except (KeyError, IndexError, TypeError, ValueError, EOFError, OSError, zipfile.BadZipFile) as error:
+        if isinstance(error, RunFileError):
+            raise
+        raise RunFileError(
+            f"{path} is not a saved run ({type(error).__name__}); expected a .npz written by Run.save"
+        ) from None
+
+
+def _task(i: int, entry: dict[str, Any], arrays: dict[str, Any]) -> TaskRecord:
+    values: dict[str, Any] = {n: arrays.get(f"task{i}_{n}") for n in _TASK_ARRAYS}
+    return TaskRecord(**entry, **values)
+
+
+def _write(path: Path, arrays: dict[str, Any]) -> None:
+    handle, name = tempfile.mkstemp(dir=path.parent, prefix=path.stem, suffix=".part")
+    try:
+        with os.fdopen(handle, "wb") as file:
+            np.savez_compressed(file, **arrays)
+        os.replace(name, path)
+    except BaseException:
+        Path(name).unlink(missing_ok=True)
+        raise

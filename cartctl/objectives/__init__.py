@@ -1,0 +1,6 @@
+"""What to spend the redundancy on: H(q) and its gradient."""
+
+from cartctl.objectives.base import Objective
+from cartctl.objectives.joint_range import JointRange
+
+__all__ = ["JointRange", "Objective"]

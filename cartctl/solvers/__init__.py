@@ -1,0 +1,69 @@
+"""The registry of methods: one file each, one line each. Works without Pinocchio."""
+
+from __future__ import annotations
+
+from importlib import import_module
+
+from cartctl.algebra.problem import Problem
+from cartctl.algebra.solution import Solution
+from cartctl.errors import ParameterError, SolverNotFound
+from cartctl.solvers.base import EquationSolver, Solver
+
+_REGISTRY = {
+    "pinv": "pinv:Pinv",
+    "dls": "dls:DLS",
+    "projected-gradient": "projected_gradient:ProjectedGradient",
+    "task-priority": "task_priority:TaskPriority",
+}
+
+__all__ = [
+    "EquationSolver",
+    "Solver",
+    "get_solver",
+    "solve",
+    "solver_class",
+    "solvers",
+    "solvers_that_honour",
+]
+
+
+def solver_class(name: str) -> type[Solver]:
+    """The class registered under ``name``; raises SolverNotFound with the closest names."""
+    if name not in _REGISTRY:
+        raise SolverNotFound(name, _REGISTRY)
+    module, _, cls = _REGISTRY[name].partition(":")
+    return getattr(import_module(f"cartctl.solvers.{module}"), cls)  # type: ignore[no-any-return]
+
+
+def solvers() -> dict[str, str]:
+    """Every registered name with one line on what it does."""
+    return {name: (solver_class(name).__doc__ or "").strip().splitlines()[0] for name in _REGISTRY}
+
+
+def solvers_that_honour(feature: str) -> list[str]:
+    """Names of the registered solvers that honour ``"reference"``, ``"bounds"`` or ``"constraints"``."""
+    return [name for name in _REGISTRY if feature in solver_class(name).honours]
+
+
+def get_solver(solver: str | Solver | type[Solver]) -> Solver:
+    """An instance: by name, from a class with its default parameters, or as given.
+
+    Raises SolverNotFound, ParameterError.
+    """
+    if isinstance(solver, Solver):
+        return solver
+    if isinstance(solver, str):
+        return solver_class(solver)()
+    if isinstance(solver, type) and issubclass(solver, Solver):
+        return solver()
+    raise ParameterError(f"solver is {solver!r}; expected a name from cc.solvers() or a Solver instance")
+
+
+def solve(problem: Problem, solver: str | Solver | type[Solver] = "pinv") -> Solution:
+    """The answer of ``solver`` to ``problem``.
+
+    Raises SolverNotFound, UnsupportedProblem. Numerical trouble is in ``solution.status``.
+    """
+    if not isinstance(problem, Problem):
+        raise ParameterError(f"problem is a {type(problem).__name__}; expected a cc.Problem")
+    return get_solver(solver).solve(problem)

@@ -1,0 +1,128 @@
+"""Damped least squares: u = A^T (A A^T + lambda^2 I)^-1 (b - d) + (I - A# A) u0.
+
+The minimum of ||A u + d - b||^2 + lambda^2 ||u||_W^2 for u0 = 0 (Nakamura & Hanafusa 1986; Wampler 1986): u stays
+bounded by ||b|| / (2 lambda) through singularities, at the price of an error lambda^2 / (sigma^2 + lambda^2) along
+each singular direction. The smaller of the two normal systems, (m, m) or (n, n), is solved by Cholesky. A reference
+u0 enters through the exact projector, for a damped one leaks into the task.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from cartctl import checks
+from cartctl.algebra.metric import Whitening
+from cartctl.algebra.nullspace import null_part
+from cartctl.algebra.problem import Problem
+from cartctl.algebra.solution import Solution, Status
+from cartctl.algebra.svd import round_off, singular_values, svd
+from cartctl.checks import FloatArray
+from cartctl.kernels import kernel
+from cartctl.solvers.base import Answer, EquationSolver, stack
+
+
+@dataclass(frozen=True)
+class DLS(EquationSolver):
+    """Damped least squares over all equations stacked.
+
+    damping: lambda > 0, in the units of the stacked matrix's singular values.
+    """
+
+    name: ClassVar[str] = "dls"
+    honours: ClassVar[frozenset[str]] = frozenset({"reference"})
+    damping: float = 1e-2
+
+    def __post_init__(self) -> None:
+        checks.number("damping", self.damping, low=0.0, strict=True)
+
+    def _impl(self, systems: list[tuple[FloatArray, FloatArray]], problem: Problem, u0: FloatArray | None) -> Answer:
+        A, c = stack(systems, problem.equations)
+        u = damped_solve(A, c, self.damping * self.damping)
+        if u0 is not None:
+            u = u + null_part(svd(A), round_off(A), u0)
+        return Answer(u, False)
+
+    def grade(self, solution: Solution) -> Status:
+        """SINGULAR where damping outweighs a direction, sigma_min < lambda; decided only when asked."""
+        problem = solution.problem
+        white = None if problem.metric is None else Whitening(problem.metric)
+        systems = [(e.A if white is None else white.matrix(e.A), e.rhs) for e in problem.equations]
+        A, _ = stack(systems, problem.equations)
+        s = singular_values(A)
+        if s.shape[0] and s[-1] < self.damping:
+            return Status.SINGULAR
+        overdetermined = A.shape[0] > A.shape[1]
+        return super().grade(solution) if overdetermined else Status.OPTIMAL
+
+
+def damped_solve(A: FloatArray, c: FloatArray, squared: float) -> FloatArray:
+    """``argmin ||A u - c||^2 + squared ||u||^2``, (n,), A (m, n), squared > 0."""
+    u = np.empty(A.shape[1])
+    if not damped_kernel.compiled(A, c, squared, u):
+        return _by_filter(A, c, squared)  # squared below the round-off of A A^T: the filter factors are still exact
+    return u
+
+
+@kernel
+def damped_kernel(A: FloatArray, c: FloatArray, squared: float, u: FloatArray) -> bool:
+    """Fill u by a Cholesky factorisation of the smaller normal matrix; False where a pivot is not positive."""
+    m, n = A.shape
+    k = min(m, n)
+    G = np.empty((k, k))
+    y = np.empty(k)
+    for i in range(k):
+        for j in range(i + 1):
+            total = 0.0
+            if m <= n:
+                for a in range(n):
+                    total += A[i, a] * A[j, a]
+            else:
+                for a in range(m):
+                    total += A[a, i] * A[a, j]
+            G[i, j] = total
+        G[i, i] += squared
+        if m <= n:
+            y[i] = c[i]
+        else:
+            total = 0.0
+            for a in range(m):
+                total += A[a, i] * c[a]
+            y[i] = total
+    for i in range(k):  # L L^T = G and L y = rhs in one sweep
+        for j in range(i + 1):
+            total = G[i, j]
+            for a in range(j):
+                total -= G[i, a] * G[j, a]
+            if i == j:
+                if not total > 0.0:
+                    return False
+                G[i, i] = np.sqrt(total)
+            else:
+                G[i, j] = total / G[j, j]
+        for a in range(i):
+            y[i] -= G[i, a] * y[a]
+        y[i] /= G[i, i]
+    for i in range(k - 1, -1, -1):
+        for a in range(i + 1, k):
+            y[i] -= G[a, i] * y[a]
+        y[i] /= G[i, i]
+    for j in range(n):
+        if m <= n:
+            total = 0.0
+            for i in range(m):
+                total += A[i, j] * y[i]
+            u[j] = total
+        else:
+            u[j] = y[j]
+    return True
+
+
+def _by_filter(A: FloatArray, c: FloatArray, squared: float) -> FloatArray:
+    decomposition = svd(A)
+    s = decomposition.s
+    k = s.shape[0]
+    phi = np.divide(s, s * s + squared, out=np.zeros_like(s), where=s > 0.0)
+    return decomposition.Vt[:k].T @ (phi * (decomposition.U.T @ c))  # type: ignore[no-any-return]

@@ -1,0 +1,101 @@
+"""What a task is, and how to add one.
+
+A task is a quantity r(q) of size m with Jacobian J = dr/dq (in the tangent space) and drift J_dot v, and a target.
+It knows no level and no solver: a level makes the command from the error and the target's rates, b = r_dot_ref + K e
+at the velocity level.
+
+Subclass :class:`Task`: give ``check``, ``units``, ``jacobian``, ``drift`` and ``reference``. For a function you already
+have, :class:`cartctl.FunctionTask` takes it as it is.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from typing import Any, ClassVar, NamedTuple
+
+import numpy as np
+
+from cartctl import checks
+from cartctl.algebra.problem import FITS
+from cartctl.checks import FloatArray
+from cartctl.errors import ParameterError, ShapeError
+from cartctl.model.robot import Robot
+from cartctl.model.state import State
+
+
+class Reference(NamedTuple):
+    """Where a task is to go, seen from where it is. None stands for zero."""
+
+    error: FloatArray  # (m,) target minus value
+    rate: FloatArray | None = None  # (m,) r_dot_ref
+    acceleration: FloatArray | None = None  # (m,) r_ddot_ref
+
+
+class Observation(NamedTuple):
+    """What a run records for pictures: the value and the target, as x y z qx qy qz qw or x y z."""
+
+    value: FloatArray
+    target: FloatArray
+
+
+class Task(ABC):
+    """A quantity to be brought to a target.
+
+    gain: k in 1/s, > 0 or 0 for pure feedforward, one number or one a row: K = k at the velocity level, K_p = k^2 and
+    K_d = 2 k above it. weight: >= 0, counts where a solver weighs tasks instead of ranking them. fit: ``"scale"`` or
+    ``"least_squares"``, see :class:`cartctl.Equation`. name: for reports.
+
+    Raises ParameterError, NonFiniteError.
+    """
+
+    kind: ClassVar[str]
+
+    def __init__(self, *, gain: Any, weight: float, fit: str, name: str) -> None:
+        self.gain = _gain(gain)
+        self.weight = checks.number("weight", weight, low=0.0)
+        self.fit = checks.choice("fit", fit, FITS)
+        self.name = name
+
+    @property
+    def frame(self) -> str | None:
+        """The frame that moves, where there is one."""
+        return None
+
+    @abstractmethod
+    def units(self, robot: Robot) -> list[str]:
+        """The unit of each row: ``"m"``, ``"rad"`` or ``""``."""
+
+    def check(self, robot: Robot) -> None:
+        """Refuse what does not fit the robot, once, when a controller is made."""
+        m = len(self.units(robot))
+        if isinstance(self.gain, np.ndarray) and self.gain.shape != (m,):
+            raise ShapeError(f"task {self.name!r}: gain has shape {self.gain.shape}; expected a number or ({m},)")
+
+    @abstractmethod
+    def jacobian(self, state: State) -> FloatArray:
+        """``J`` (m, nv)."""
+
+    @abstractmethod
+    def drift(self, state: State) -> FloatArray:
+        """``J_dot v`` (m,)."""
+
+    @abstractmethod
+    def reference(self, state: State, t: float, anchor: Any) -> Reference:
+        """Error and target rates at time t; ``anchor`` is what :meth:`anchor` said at the first step."""
+
+    def anchor(self, state: State) -> Any:
+        """What this task holds on to where its target leaves something open; asked once, at the first step."""
+        return None
+
+    def observe(self, state: State, t: float, anchor: Any) -> Observation | None:
+        """Value and target in the world, for pictures; None where there is nothing to draw."""
+        return None
+
+
+def _gain(gain: Any) -> float | FloatArray:
+    if np.ndim(gain) == 0:
+        return checks.number("gain", gain, low=0.0)
+    array = checks.vector("gain", gain)
+    if (array < 0.0).any():
+        raise ParameterError(f"gain is {array}; expected numbers of at least 0, in 1/s")
+    return array

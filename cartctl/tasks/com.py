@@ -1,0 +1,86 @@
+"""The centre of mass."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, ClassVar
+
+import numpy as np
+
+from cartctl.checks import FloatArray
+from cartctl.model.robot import Robot
+from cartctl.model.state import State
+from cartctl.tasks.axes import pose_rows
+from cartctl.tasks.base import Observation, Reference, Task
+from cartctl.tasks.target import point_target, read
+
+
+class ComTask(Task):
+    """Bring the centre of mass, or some of its axes, to a target (3,) in the world, m.
+
+    axes: ``"position"``, letters as in ``"xy"``, or a mask of three. target: (3,), a path, or None (hold what the first
+    step finds). gain (1/s), weight, fit, name as in :class:`cartctl.FrameTask`. Raises ParameterError, TargetError.
+    """
+
+    kind: ClassVar[str] = "com"
+
+    def __init__(
+        self,
+        axes: Any = "position",
+        gain: Any = 10.0,
+        *,
+        target: Any = None,
+        weight: float = 1.0,
+        fit: str = "scale",
+        name: str = "com",
+    ) -> None:
+        super().__init__(gain=gain, weight=weight, fit=fit, name=name)
+        self.rows = pose_rows(axes, size=3)
+        self._index = np.array(self.rows)
+        self.target = target
+
+    @property
+    def target(self) -> Any:
+        """A point (3,), a path, or None."""
+        return self._target
+
+    @target.setter
+    def target(self, value: Any) -> None:
+        target = point_target(value, f"task {self.name!r}: target", 3)
+        self._path: Callable[[float], Any] | None = target if callable(target) else None
+        self._point: FloatArray | None = None if callable(target) else target
+        self._target = value
+
+    def units(self, robot: Robot) -> list[str]:
+        """M."""
+        return ["m"] * len(self.rows)
+
+    def jacobian(self, state: State) -> FloatArray:
+        """``J_com`` (m, nv)."""
+        return state.com_jacobian[self._index]  # type: ignore[no-any-return]
+
+    def drift(self, state: State) -> FloatArray:
+        """``J_com_dot v`` (m,)."""
+        return state.com_drift[self._index]  # type: ignore[no-any-return]
+
+    def anchor(self, state: State) -> FloatArray:
+        """The centre of mass at the first step."""
+        return state.com
+
+    def reference(self, state: State, t: float, anchor: FloatArray | None) -> Reference:
+        """Target minus centre of mass, and the target's rates."""
+        if self._path is None:
+            return Reference((self._wanted(anchor, state) - state.com)[self._index])
+        goal = read(self._path(t), f"task {self.name!r}")
+        parts = (goal.position - state.com, goal.twist, goal.acceleration)
+        return Reference(*(np.asarray(part)[self._index] for part in parts))
+
+    def observe(self, state: State, t: float, anchor: FloatArray | None) -> Observation:
+        """Centre of mass and target, x y z."""
+        wanted = self._wanted(anchor, state) if self._path is None else self._path(t).position
+        return Observation(state.com, np.asarray(wanted))
+
+    def _wanted(self, anchor: FloatArray | None, state: State) -> FloatArray:
+        if self._point is not None:
+            return self._point
+        return state.com if anchor is None else anchor

@@ -1,0 +1,199 @@
+"""A URDF is data: what is wrong with it is said in one line, and it reaches nowhere it was not given."""
+
+from __future__ import annotations
+
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import cartctl as cc
+from cartctl.errors import (
+    CartctlError,
+    CartctlWarning,
+    FrameNotFound,
+    JointNotFound,
+    NonFiniteError,
+    ParameterError,
+    RobotNotFound,
+    ShapeError,
+    UrdfError,
+)
+
+LINK = '<link name="{0}"><inertial><mass value="1"/><inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial>{1}</link>'
+JOINT = (
+    '<joint name="{0}" type="{3}"><parent link="{1}"/><child link="{2}"/><origin xyz="0 0 0.3"/><axis xyz="0 1 0"/>'
+    '<limit lower="-2" upper="2.5" velocity="3" effort="10"/>{4}</joint>'
+)
+
+
+def arm(extra: str = "", visual: str = "", kind: str = "revolute", joint_extra: str = "") -> str:
+    links = LINK.format("base", visual) + LINK.format("upper", "") + LINK.format("lower", "")
+    joints = JOINT.format("shoulder", "base", "upper", kind, "") + JOINT.format(
+        "elbow", "upper", "lower", kind, joint_extra
+    )
+    return f'<robot name="arm">{links}{joints}{extra}</robot>'
+
+
+def write(path: Path, text: str) -> Path:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(text)
+    return path
+
+
+def mesh(filename: str) -> str:
+    return f'<visual><geometry><mesh filename="{filename}"/></geometry></visual>'
+
+
+CUBE = (
+    "solid c\n"
+    + "".join(
+        f"facet normal 0 0 1\nouter loop\nvertex 0 0 {z}\nvertex 1 0 {z}\nvertex 0 1 {z}\nendloop\nendfacet\n"
+        for z in (0, 1)
+    )
+    + "endsolid c\n"
+)
+
+
+def test_a_plain_urdf_loads_with_its_limits(tmp_path: Path) -> None:
+    robot = cc.load(write(tmp_path / "arm.urdf", arm()))
+    assert robot.joint_names == ("shoulder", "elbow")
+    np.testing.assert_allclose(robot.limits.position_lower, [-2, -2])
+    np.testing.assert_allclose(robot.limits.position_upper, [2.5, 2.5])
+    np.testing.assert_allclose(robot.limits.velocity_lower, [-3, -3])
+    np.testing.assert_allclose(robot.limits.torque_upper, [10, 10])
+    assert np.isposinf(robot.limits.acceleration_upper).all() and np.isneginf(robot.limits.jerk_lower).all()
+
+
+BOMB = '<!DOCTYPE r [<!ENTITY a "aaaaaaaaaa"><!ENTITY b "&a;&a;&a;&a;&a;&a;&a;&a;">]>'
+EXTERNAL = '<!DOCTYPE r [<!ENTITY a SYSTEM "file:///etc/passwd">]>'
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("", "well-formed"),
+        ("<robot name='x'>", "well-formed"),
+        ("<html></html>", "<html>"),
+        (BOMB + arm().replace('name="arm"', 'name="&b;"'), "entities"),
+        (EXTERNAL + arm().replace('name="arm"', 'name="&a;"'), "entities"),
+        ('<robot name="none"><link name="a"/></robot>', "none that moves"),
+        (arm(kind="fixed"), "none that moves"),
+        (arm(kind="floating"), "floating"),
+        (arm(kind="hinge"), "hinge"),
+        (arm().replace('child link="lower"', 'child link="nowhere"'), "nowhere"),
+        (arm().replace('child link="lower"', 'child link="upper"'), "two parent joints"),
+        (arm(LINK.format("stray", "")), "root links"),
+        (arm().replace('lower="-2"', 'lower="nan"', 1), "nan"),
+        (arm().replace('mass value="1"', 'mass value="inf"', 1), "inf"),
+        (arm().replace('ixx="1"', 'ixx="one"', 1), "one"),
+        (arm().replace('name="elbow"', 'name="shoulder"'), "twice"),
+        (arm().replace('<link name="base"', "<link"), "no name"),
+        (arm().replace('lower="-2" upper="2.5"', 'lower="2" upper="-2.5"', 1), "lower <= upper"),
+        (arm().replace('<limit lower="-2" upper="2.5" velocity="3" effort="10"/>', "", 1), "no <limit>"),
+        (arm(joint_extra='<mimic joint="ghost"/>'), "ghost"),
+        ('<robot xmlns:xacro="http://www.ros.org/wiki/xacro"><xacro:macro name="m"/></robot>', "xacro"),
+    ],
+)
+def test_a_bad_urdf_is_refused_in_one_line(tmp_path: Path, text: str, says: str) -> None:
+    path = write(tmp_path / "bad.urdf", text)
+    with pytest.raises(UrdfError) as caught:
+        cc.load(path)
+    assert says in str(caught.value)
+    assert "\n" not in str(caught.value)
+    assert "bad.urdf" in str(caught.value)
+
+
+def test_binary_rubbish_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "rubbish.urdf"
+    path.write_bytes(bytes(range(256)) * 4)
+    with pytest.raises(UrdfError):
+        cc.load(path)
+
+
+def test_missing_files_and_unknown_names(tmp_path: Path) -> None:
+    with pytest.raises(UrdfError, match="no such file"):
+        cc.load(tmp_path / "nothing.urdf")
+    with pytest.raises(UrdfError, match="folder"):
+        cc.load(tmp_path)
+    with pytest.raises(RobotNotFound, match="panda"):
+        cc.load("pandda")
+    with pytest.raises(RobotNotFound):
+        cc.load("")
+
+
+@pytest.mark.parametrize(
+    ("options", "error"),
+    [
+        ({"active_joints": ["elbov"]}, JointNotFound),
+        ({"active_joints": []}, UrdfError),
+        ({"root_joint": "floating"}, ParameterError),
+        ({"tool": "hand"}, FrameNotFound),
+        ({"home": {"knee": 0.1}}, JointNotFound),
+        ({"home": {"elbow": float("nan")}}, NonFiniteError),
+        ({"gravity": (0, 0)}, ShapeError),
+        ({"gravity": (0, 0, float("inf"))}, NonFiniteError),
+    ],
+)
+def test_bad_options_are_refused(tmp_path: Path, options: dict, error: type[CartctlError]) -> None:
+    with pytest.raises(error) as caught:
+        cc.load(write(tmp_path / "arm.urdf", arm()), **options)
+    assert "\n" not in str(caught.value)
+
+
+def test_meshes_beside_the_urdf_and_in_packages(tmp_path: Path) -> None:
+    write(tmp_path / "robots/meshes/cube.stl", CUBE)
+    write(tmp_path / "shapes/meshes/cube.stl", CUBE)
+    for name, options in {
+        "meshes/cube.stl": {},
+        "package://shapes/meshes/cube.stl": {"package_dirs": [tmp_path]},
+        "package://shapes/meshes/./cube.stl": {"package_dirs": [tmp_path / "shapes"]},
+        "package://robots/meshes/cube.stl": {},
+        f"file://{tmp_path}/robots/meshes/cube.stl": {},
+    }.items():
+        robot = cc.load(write(tmp_path / "robots/arm.urdf", arm(visual=mesh(name))), **options)
+        assert len(robot.visual_model.geometryObjects) == 1, name
+
+
+def test_a_ros_package_around_the_urdf_is_its_own_folder(tmp_path: Path) -> None:
+    write(tmp_path / "my_robot/package.xml", "<package/>")
+    write(tmp_path / "my_robot/meshes/cube.stl", CUBE)
+    robot = cc.load(write(tmp_path / "my_robot/urdf/arm.urdf", arm(visual=mesh("../meshes/cube.stl"))))
+    assert len(robot.visual_model.geometryObjects) == 1
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "../secret/cube.stl",
+        "/etc/passwd",
+        "package://shapes/../../secret/cube.stl",
+        "http://a.b/c.stl",
+        "file:///etc/hostname",
+        "link.stl",
+    ],
+)
+def test_meshes_that_climb_out_are_refused(tmp_path: Path, name: str) -> None:
+    write(tmp_path / "secret/cube.stl", CUBE)
+    (tmp_path / "given/shapes").mkdir(parents=True)
+    path = write(tmp_path / "given/arm.urdf", arm(visual=mesh(name)))
+    (tmp_path / "given/link.stl").symlink_to(tmp_path / "secret/cube.stl")
+    with pytest.raises(UrdfError, match="outside|scheme"):
+        cc.load(path, package_dirs=[tmp_path / "given"])
+
+
+def test_missing_meshes_are_one_warning(tmp_path: Path) -> None:
+    path = write(tmp_path / "arm.urdf", arm(visual=mesh("a.stl") + mesh("package://gone/b.stl")))
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        robot = cc.load(path)
+    assert len([w for w in caught if issubclass(w.category, CartctlWarning)]) == 1
+    assert "2 mesh" in str(caught[0].message)
+    assert robot.visual_model.ngeoms == 0
+
+
+def test_an_absent_velocity_limit_is_none_not_zero(tmp_path: Path) -> None:
+    text = arm().replace('velocity="3" effort="10"', "")
+    robot = cc.load(write(tmp_path / "arm.urdf", text))
+    assert np.isposinf(robot.limits.velocity_upper).all() and np.isneginf(robot.limits.torque_lower).all()
