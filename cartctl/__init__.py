@@ -38,12 +38,24 @@ _HOMES = {
         "Task",
     ),
     "cartctl.objectives": ("JointRange", "Objective"),
-    "cartctl.levels": ("Command", "levels"),
+    "cartctl.levels": ("Command",),
     "cartctl.motion.controller": ("Controller",),
     "cartctl.motion.simulate": ("simulate",),
     "cartctl.motion.run": ("Run", "TaskRecord"),
     "cartctl.motion.metrics": ("JointMetrics", "Metrics", "TaskMetrics"),
-    "cartctl.paths": ("Circle", "Ellipse", "Line", "Lissajous", "Path", "PathSample", "Polygon", "Waypoints"),
+    "cartctl.paths": (
+        "Circle",
+        "Ellipse",
+        "Line",
+        "Lissajous",
+        "Path",
+        "PathSample",
+        "Polygon",
+        "Quintic",
+        "SmoothTrapezoid",
+        "TimingLaw",
+        "Waypoints",
+    ),
 }
 _HOME_OF = {name: module for module, names in _HOMES.items() for name in names}
 
@@ -61,7 +73,6 @@ if TYPE_CHECKING:  # editors and mypy see what __getattr__ finds
     from cartctl.errors import CartctlWarning as CartctlWarning
     from cartctl.errors import RunInterrupted as RunInterrupted
     from cartctl.levels import Command as Command
-    from cartctl.levels import levels as levels
     from cartctl.model.library import robots as robots
     from cartctl.model.limits import Limits as Limits
     from cartctl.model.loading import load as load
@@ -84,6 +95,9 @@ if TYPE_CHECKING:  # editors and mypy see what __getattr__ finds
     from cartctl.paths import Path as Path
     from cartctl.paths import PathSample as PathSample
     from cartctl.paths import Polygon as Polygon
+    from cartctl.paths import Quintic as Quintic
+    from cartctl.paths import SmoothTrapezoid as SmoothTrapezoid
+    from cartctl.paths import TimingLaw as TimingLaw
     from cartctl.paths import Waypoints as Waypoints
     from cartctl.solvers import EquationSolver as EquationSolver
     from cartctl.solvers import Solver as Solver
@@ -106,7 +120,7 @@ if TYPE_CHECKING:  # editors and mypy see what __getattr__ finds
 def __getattr__(name: str) -> Any:
     if name not in _HOME_OF:
         raise AttributeError(f"module 'cartctl' has no attribute {name!r}")
-    value = getattr(import_module(_HOME_OF[name]), name)
+    value = import_module("cartctl.solvers") if name == "solvers" else getattr(import_module(_HOME_OF[name]), name)
     globals()[name] = value
     return value
 

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cartctl.errors import NonFiniteError, ParameterError, ShapeError
+from cartctl.errors import NonFiniteError, ParameterError, ShapeError, TimeStepError
 
 FloatArray = NDArray[np.float64]
 
@@ -88,6 +88,14 @@ def number(name: str, value: Any, *, low: float = -math.inf, high: float = math.
     if x < low or x > high or (strict and x == low):
         raise ParameterError(f"{name} is {x:g}; expected a number {_interval(low, high, strict)}")
     return x
+
+
+def duration(name: str, value: Any) -> float:
+    """``value`` as a positive number of seconds; raises TimeStepError, NonFiniteError."""
+    try:
+        return number(name, value, low=0.0, strict=True)
+    except ParameterError as error:
+        raise TimeStepError(f"{error} s") from None
 
 
 def choice(name: str, value: Any, options: Sequence[str]) -> str:

@@ -34,12 +34,20 @@ class ProblemError(CartctlError, ValueError):
     """A Problem contradicts itself: crossed bounds, an unknown fit, a negative weight, an empty task list."""
 
 
+class NoTasksError(ProblemError):
+    """A controller was given no task."""
+
+
 class UnsupportedProblem(CartctlError, ValueError):  # noqa: N818 - the public name
     """The chosen solver cannot honour something in the problem, and says so instead of ignoring it."""
 
 
 class ParameterError(CartctlError, ValueError):
     """A parameter lies outside its domain: a negative gain, dt <= 0, an unknown option."""
+
+
+class TimeStepError(ParameterError):
+    """A time step or duration is not positive."""
 
 
 class TargetError(CartctlError, ValueError):
@@ -56,6 +64,22 @@ class ConfigurationError(CartctlError, ValueError):
 
 class UrdfError(CartctlError, ValueError):
     """A URDF cannot be read, holds no joints, or reaches outside the folders it was given."""
+
+
+class MissingUrdfError(UrdfError):
+    """There is no such URDF file."""
+
+
+class MalformedUrdfError(UrdfError):
+    """The file is not well-formed XML, or not a URDF's."""
+
+
+class NoJointsError(UrdfError):
+    """The URDF holds no joint that moves."""
+
+
+class UnsafeUrdfError(UrdfError):
+    """The URDF declares XML entities, or names a mesh outside the folders it was given."""
 
 
 class RunFileError(CartctlError, ValueError):

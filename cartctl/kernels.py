@@ -26,10 +26,11 @@ _log = logging.getLogger("cartctl")
 
 
 class Kernel(Generic[P, R]):
-    """A function that compiles itself at its first call."""
+    """A function that compiles itself, for one signature, when it is first called or asked for."""
 
-    def __init__(self, function: Callable[P, R]) -> None:
+    def __init__(self, function: Callable[P, R], signature: str) -> None:
         self.function = function
+        self.signature = signature
         self.__doc__ = function.__doc__
         self.__name__ = function.__name__
 
@@ -43,26 +44,42 @@ class Kernel(Generic[P, R]):
         try:
             return self._compiled
         except AttributeError:
-            self._compiled: Callable[P, R] = _compile(self.function)
+            self._compiled: Callable[P, R] = _compile(self.function, self.signature)
             return self._compiled
 
 
-def kernel(function: Callable[P, R]) -> Kernel[P, R]:
-    """Mark ``function`` as a kernel."""
-    return Kernel(function)
+def kernel(signature: str) -> Callable[[Callable[P, R]], Kernel[P, R]]:
+    """Mark a function as a kernel of the given signature, such as ``"bool(matrix, vector, float, out_vector)"``.
+
+    ``vector`` and ``matrix`` are float64 arrays of any memory order, read-only ones included; the kernel writes only
+    to an ``out_`` argument. One signature means one compilation, at a time of the caller's choosing.
+    """
+    return lambda function: Kernel(function, signature)
 
 
-def _compile(function: Callable[P, R]) -> Callable[P, R]:
+def _numba_type(name: str) -> Any:
+    from numba import types
+
+    arrays = {"vector": 1, "matrix": 2}
+    bare = name.removeprefix("out_")
+    if bare in arrays:
+        return types.Array(types.float64, arrays[bare], "A", readonly=bare == name)
+    return {"float": types.float64, "int": types.int64, "bool": types.boolean, "void": types.void}[name]
+
+
+def _compile(function: Callable[P, R], signature: str) -> Callable[P, R]:
     import numba
 
+    returned, _, arguments = signature.rstrip(")").partition("(")
+    types = _numba_type(returned)(*(_numba_type(name.strip()) for name in arguments.split(",")))
     folder = _cache_folder()
     if folder is None:
-        return numba.njit(function)  # type: ignore[no-any-return]
+        return numba.njit(types)(function)  # type: ignore[no-any-return]
     # numba reads the folder while it decorates; the setting is global, so it is put back for the caller's own functions
     before = numba.config.CACHE_DIR
     numba.config.CACHE_DIR = str(folder)
     try:
-        return numba.njit(cache=True)(function)  # type: ignore[no-any-return]
+        return numba.njit(types, cache=True)(function)  # type: ignore[no-any-return]
     finally:
         numba.config.CACHE_DIR = before
 

@@ -84,7 +84,7 @@ def log3(R: FloatArray) -> FloatArray:
     return error[3:]
 
 
-@kernel
+@kernel("void(vector, matrix, vector, matrix, out_vector)")
 def pose_error(p: FloatArray, R: FloatArray, p_d: FloatArray, R_d: FloatArray, error: FloatArray) -> None:
     """Fill error (6,) with ``[p_d - p; log3(R_d R^T)]``.
 

@@ -29,7 +29,12 @@ def talos() -> cc.Robot:
     return cc.load("talos", root_joint="free_flyer")
 
 
-ROBOTS = {"planar": planar, "panda": panda, "kinova": kinova, "talos": talos}
+@cache
+def pendulum() -> cc.Robot:
+    return cc.planar([0.8], gravity=(0.0, -9.81, 0.0))
+
+
+ROBOTS = {"pendulum": pendulum, "planar": planar, "panda": panda, "kinova": kinova, "talos": talos}
 
 
 def random_state(robot: cc.Robot, rng: np.random.Generator) -> cc.State:

@@ -18,10 +18,12 @@ from cartctl.errors import (
     LevelNotFound,
     MetricError,
     NonFiniteError,
+    NoTasksError,
     ParameterError,
     ProblemError,
     ShapeError,
     SolverNotFound,
+    TimeStepError,
     UnsupportedProblem,
 )
 from tests.robots_for_tests import ROBOTS, panda, planar
@@ -134,7 +136,7 @@ class Seized(cc.Objective):
 @pytest.mark.parametrize(
     ("options", "error", "says"),
     [
-        ({"tasks": []}, ProblemError, "empty"),
+        ({"tasks": []}, NoTasksError, "empty"),
         ({"tasks": "hand"}, ProblemError, "tasks"),
         ({"tasks": 3}, ProblemError, "int"),
         ({"tasks": [None]}, ProblemError, "NoneType"),
@@ -142,8 +144,8 @@ class Seized(cc.Objective):
         ({"solver": 3}, ParameterError, "solver"),
         ({"level": "speed"}, LevelNotFound, "velocity"),
         ({"level": None}, ParameterError, "level"),
-        ({"dt": 0.0}, ParameterError, "dt is 0"),
-        ({"dt": -1e-3}, ParameterError, "dt"),
+        ({"dt": 0.0}, TimeStepError, "dt is 0"),
+        ({"dt": -1e-3}, TimeStepError, "dt"),
         ({"dt": np.nan}, NonFiniteError, "dt"),
         ({"dt": "1ms"}, ParameterError, "dt"),
         ({"metric": -np.eye(3)}, MetricError, "eigenvalue"),
@@ -254,3 +256,27 @@ def test_arguments_are_neither_changed_nor_kept() -> None:
         command.solution.problem.equations[0].A @ kept,
         command.solution.problem.equations[0].A @ command.velocity,
     )
+
+
+def test_a_soft_start_rises_smoothly_to_the_full_share() -> None:
+    robot = panda()
+    hard, soft = (
+        cc.Controller(
+            robot,
+            cc.FrameTask(robot.tool),
+            solver="projected-gradient",
+            limits=None,
+            objective=cc.JointRange(),
+            soft_start=s,
+        )
+        for s in (0.0, 0.4)
+    )
+    full = hard.step(robot.home, t=5.0).velocity
+    shares = [
+        soft.step(robot.home, t=5.0 + dt).velocity @ full / (full @ full) for dt in (0.0, 0.1, 0.2, 0.3, 0.4, 2.0)
+    ]
+    np.testing.assert_allclose(shares, [0.0, 0.15625, 0.5, 0.84375, 1.0, 1.0], atol=1e-9)
+    soft.reset()
+    np.testing.assert_allclose(soft.step(robot.home, t=9.0).velocity, 0.0, atol=1e-9)
+    with pytest.raises(ParameterError, match="soft_start"):
+        cc.Controller(robot, cc.FrameTask(robot.tool), limits=None, soft_start=-1.0)

@@ -146,9 +146,7 @@ def joints(path: Path) -> list[float]:
         corners = [v + d for v in vertices[1:-1] for d in (-near, near)] if near else []
         lap = [path.timing.inverse(c) for c in corners]
         legs = [(lap_k + a, lap_k + b) for lap_k in range(path.laps) for a, b in pairwise(stops)]
-        found = [
-            x / path.laps * path.duration for a, b in legs for x in (a, *(a + t * (b - a) for t in lap), b)
-        ]
+        found = [x / path.laps * path.duration for a, b in legs for x in (a, *(a + t * (b - a) for t in lap), b)]
         spans = [(a / path.laps * path.duration, b / path.laps * path.duration) for a, b in legs]
     elif isinstance(path, Waypoints):
         found = path.passing_times.tolist()
@@ -543,9 +541,7 @@ def test_spline_is_the_minimum_jerk_spline_for_positions_and_for_turns_about_one
 
 
 @settings(deadline=None, max_examples=30)
-@given(
-    vectors, vectors, st.lists(st.floats(0.1, 0.9), min_size=1, max_size=4, unique=True), st.floats(0.0, 1.0)
-)
+@given(vectors, vectors, st.lists(st.floats(0.1, 0.9), min_size=1, max_size=4, unique=True), st.floats(0.0, 1.0))
 def test_waypoints_along_a_line_move_as_the_line_does(start, end, shares, fraction):
     assume(np.linalg.norm(end - start) > 0.1)
     shares = [0.0, *sorted(shares), 1.0]
@@ -585,9 +581,7 @@ def test_closed_needs_the_orientation_back_as_well(start, via, angle):
 
 
 @settings(deadline=None)
-@given(
-    unit_vectors, st.one_of(st.floats(0.0, 1e-3), st.floats(0.9, 1.1), st.floats(0.0, 6.2)), vectors, vectors
-)
+@given(unit_vectors, st.one_of(st.floats(0.0, 1e-3), st.floats(0.9, 1.1), st.floats(0.0, 6.2)), vectors, vectors)
 def test_rates_of_a_rotation_vector_by_finite_differences(axis, angle, rate, rate_dot):
     theta, h = axis * angle, 1e-4
 
@@ -596,9 +590,7 @@ def test_rates_of_a_rotation_vector_by_finite_differences(axis, angle, rate, rat
 
     R = pin.exp3(theta)
     omega, alpha = left_rates(theta, rate, rate_dot)
-    np.testing.assert_allclose(
-        omega, difference(lambda t: pin.log3(pin.exp3(vector(t)) @ R.T), 0.0, h), atol=1e-9
-    )
+    np.testing.assert_allclose(omega, difference(lambda t: pin.log3(pin.exp3(vector(t)) @ R.T), 0.0, h), atol=1e-9)
     slope = difference(lambda t: left_rates(vector(t), rate + rate_dot * t, rate_dot)[0], 0.0, h)
     np.testing.assert_allclose(alpha, slope, atol=1e-9)
     body_omega, body_alpha = right_rates(theta, rate, rate_dot)

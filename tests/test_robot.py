@@ -147,3 +147,26 @@ def test_every_robot_of_the_library_loads_and_stands_inside_its_limits(name: str
     again = cc.load(**robot.spec)
     np.testing.assert_array_equal(again.home, robot.home)
     assert again.dof_names == robot.dof_names
+
+
+@pytest.mark.parametrize("name", sorted(cc.robots()))
+def test_fingers_work_when_asked_for_or_are_refused_in_words(name: str) -> None:
+    try:
+        robot = cc.load(name, fingers=True)
+    except UrdfError as error:
+        assert "mimic" in str(error) and "\n" not in str(error)
+        return
+    assert robot.nv >= cc.load(name).nv
+    state = robot.state(robot.home, np.ones(robot.nv))
+    assert np.linalg.eigvalsh(state.mass_matrix)[0] > 0.0
+
+
+def test_the_pandas_fingers_move_together() -> None:
+    robot = cc.load("panda", fingers=True)
+    assert robot.nv == 8 and robot.joint_names[-1] == "panda_finger_joint1"
+    state = robot.state(robot.configuration({"panda_finger_joint1": 0.03}, robot.home))
+    left, right = (
+        state.placement("panda_hand").actInv(state.placement(f)).translation
+        for f in ("panda_leftfinger", "panda_rightfinger")
+    )
+    assert left[1] == pytest.approx(0.03) and right[1] == pytest.approx(-0.03)

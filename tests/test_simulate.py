@@ -235,7 +235,8 @@ def test_a_real_interrupt_of_a_real_process_leaves_a_file(tmp_path: Path) -> Non
     code = (
         "import os, signal, cartctl as cc\n"
         "c = cc.Controller(cc.planar([1, 1, 1]), cc.FrameTask('tool', 'xy'), limits=None)\n"
-        "cc.simulate(c, duration=1e4, save='run.npz', progress=lambda k, n: k > 1 and os.kill(os.getpid(), signal.SIGINT))\n"
+        "stop = lambda k, n: k > 1 and os.kill(os.getpid(), signal.SIGINT)\n"
+        "cc.simulate(c, duration=1e4, save='run.npz', progress=stop)\n"
     )
     done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, timeout=120)
     assert done.returncode != 0 and "RunInterrupted" in done.stderr

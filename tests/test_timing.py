@@ -60,9 +60,7 @@ def test_derivatives_by_finite_differences(law, tau):
 @given(LAWS, st.floats(0.0, 1.0))
 def test_the_way_out_mirrors_the_way_in(law, tau):
     s, s_dot, s_ddot = law(tau)
-    np.testing.assert_allclose(
-        law(1.0 - tau), (1.0 - s, s_dot, -s_ddot), atol=1e-9 / getattr(law, "ramp", 1.0)
-    )
+    np.testing.assert_allclose(law(1.0 - tau), (1.0 - s, s_dot, -s_ddot), atol=1e-9 / getattr(law, "ramp", 1.0))
 
 
 def test_quintic_polynomial_and_peak_rate():
@@ -81,16 +79,12 @@ def test_trapezoid_cruises_at_one_over_one_minus_ramp(ramp):
         _, s_dot, s_ddot = law(tau)
         assert s_dot == pytest.approx(cruise, rel=1e-13)
         assert s_ddot == pytest.approx(0.0, abs=1e-10 / ramp)
-    assert quad(lambda tau: law(tau).s_dot, 0.0, 1.0, points=(ramp, 1 - ramp))[0] == pytest.approx(
-        1.0, abs=1e-10
-    )
+    assert quad(lambda tau: law(tau).s_dot, 0.0, 1.0, points=(ramp, 1 - ramp))[0] == pytest.approx(1.0, abs=1e-10)
 
 
 @given(RAMPS, st.floats(0.0, 1.0))
 def test_trapezoid_ramp_is_a_smoothstep(ramp, x):
-    assert SmoothTrapezoid(ramp)(x * ramp).s_dot == pytest.approx(
-        (3 * x**2 - 2 * x**3) / (1 - ramp), abs=1e-12
-    )
+    assert SmoothTrapezoid(ramp)(x * ramp).s_dot == pytest.approx((3 * x**2 - 2 * x**3) / (1 - ramp), abs=1e-12)
 
 
 @given(RAMPS)

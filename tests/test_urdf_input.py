@@ -14,14 +14,21 @@ from cartctl.errors import (
     CartctlWarning,
     FrameNotFound,
     JointNotFound,
+    MalformedUrdfError,
+    MissingUrdfError,
+    NoJointsError,
     NonFiniteError,
     ParameterError,
     RobotNotFound,
     ShapeError,
+    UnsafeUrdfError,
     UrdfError,
 )
 
-LINK = '<link name="{0}"><inertial><mass value="1"/><inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial>{1}</link>'
+LINK = (
+    '<link name="{0}"><inertial><mass value="1"/><inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial>'
+    "{1}</link>"
+)
 JOINT = (
     '<joint name="{0}" type="{3}"><parent link="{1}"/><child link="{2}"/><origin xyz="0 0 0.3"/><axis xyz="0 1 0"/>'
     '<limit lower="-2" upper="2.5" velocity="3" effort="10"/>{4}</joint>'
@@ -105,6 +112,20 @@ def test_a_bad_urdf_is_refused_in_one_line(tmp_path: Path, text: str, says: str)
     assert "bad.urdf" in str(caught.value)
 
 
+@pytest.mark.parametrize(
+    ("text", "error"),
+    [
+        ("<robot", MalformedUrdfError),
+        ("<html/>", MalformedUrdfError),
+        (arm(kind="fixed"), NoJointsError),
+        (BOMB + arm().replace('name="arm"', 'name="&b;"'), UnsafeUrdfError),
+    ],
+)
+def test_each_kind_of_badness_has_its_own_error(tmp_path: Path, text: str, error: type[UrdfError]) -> None:
+    with pytest.raises(error):
+        cc.load(write(tmp_path / "bad.urdf", text))
+
+
 def test_binary_rubbish_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "rubbish.urdf"
     path.write_bytes(bytes(range(256)) * 4)
@@ -113,7 +134,7 @@ def test_binary_rubbish_is_refused(tmp_path: Path) -> None:
 
 
 def test_missing_files_and_unknown_names(tmp_path: Path) -> None:
-    with pytest.raises(UrdfError, match="no such file"):
+    with pytest.raises(MissingUrdfError, match="no such file"):
         cc.load(tmp_path / "nothing.urdf")
     with pytest.raises(UrdfError, match="folder"):
         cc.load(tmp_path)
@@ -179,7 +200,7 @@ def test_meshes_that_climb_out_are_refused(tmp_path: Path, name: str) -> None:
     (tmp_path / "given/shapes").mkdir(parents=True)
     path = write(tmp_path / "given/arm.urdf", arm(visual=mesh(name)))
     (tmp_path / "given/link.stl").symlink_to(tmp_path / "secret/cube.stl")
-    with pytest.raises(UrdfError, match="outside|scheme"):
+    with pytest.raises(UnsafeUrdfError, match="outside|scheme"):
         cc.load(path, package_dirs=[tmp_path / "given"])
 
 

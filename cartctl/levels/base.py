@@ -52,9 +52,13 @@ class Level(ABC):
         t: float,
         anchors: Sequence[Any],
         objective: Objective | None,
+        rise: float,
         metric: FloatArray | None,
     ) -> tuple[Problem, list[Reference]]:
-        """The problem of this instant, and the references it was made from; raises NonFiniteError."""
+        """The problem of this instant, and the references it was made from; raises NonFiniteError.
+
+        rise: the share of the objective that counts, in [0, 1].
+        """
 
     @abstractmethod
     def command(self, solution: Solution, references: Sequence[Reference]) -> Command:

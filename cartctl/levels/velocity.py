@@ -26,6 +26,7 @@ class VelocityLevel(Level):
         t: float,
         anchors: Sequence[Any],
         objective: Objective | None,
+        rise: float,
         metric: FloatArray | None,
     ) -> tuple[Problem, list[Reference]]:
         """The problem of this instant, and the references it was made from; raises NonFiniteError."""
@@ -39,7 +40,9 @@ class VelocityLevel(Level):
             require_finite(b, f"the command of task {task.name!r}")
             equations.append(Equation.trusted(task.jacobian(state), b, None, task.fit, task.weight, task.name))
             references.append(reference)
-        u0 = None if objective is None else require_finite(objective.direction(state), "the objective's gradient")
+        u0 = None
+        if objective is not None:
+            u0 = rise * require_finite(objective.direction(state), "the objective's gradient")
         return Problem.trusted(tuple(equations), metric, u0), references
 
     def command(self, solution: Solution, references: Sequence[Reference]) -> Command:

@@ -44,7 +44,8 @@ class Limits:
             if bad.size:
                 i = int(bad[0])
                 raise ParameterError(
-                    f"limits.{quantity}_lower[{i}] = {low[i]:g} is above {quantity}_upper[{i}] = {high[i]:g}; expected lower <= upper"
+                    f"limits.{quantity}_lower[{i}] = {low[i]:g} is above {quantity}_upper[{i}] = {high[i]:g}; "
+                    "expected lower <= upper"
                 )
 
     def replace(self, **changes: Any) -> Limits:

@@ -41,8 +41,8 @@ def load(
     """A robot by name (see :func:`cartctl.robots`) or from a URDF file.
 
     source: a name, or a path to a .urdf. package_dirs: folders in which ``package://`` names and meshes are looked up.
-    root_joint: ``"fixed"``, ``"planar"`` or ``"free_flyer"``. active_joints: the joints that stay movable, all others are
-    locked at ``home``; by default all but those the library locks. fingers: keep those too. tool: name of the tool
+    root_joint: ``"fixed"``, ``"planar"`` or ``"free_flyer"``. active_joints: the joints that stay movable, all others
+    are locked at ``home``; by default all but those the library locks. fingers: keep those too. tool: name of the tool
     frame. home: joint name -> rad or m, over the library's. gravity: (3,), m/s^2.
 
     Raises RobotNotFound, UrdfError, JointNotFound, FrameNotFound, ParameterError, ShapeError, NonFiniteError. Missing
@@ -144,7 +144,9 @@ def _build(text: str, root: str, label: str) -> pin.Model:
             return pin.buildModelFromXML(text, True)
         return pin.buildModelFromXML(text, joint(), True)
     except (ValueError, RuntimeError) as error:
-        raise UrdfError(f"{label} cannot be built: {' '.join(str(error).split())}") from None
+        why = " ".join(str(error).split()).rstrip(".")
+        advice = "; lock its mimic joints: leave them out of active_joints" if "mimic" in why.lower() else ""
+        raise UrdfError(f"{label} cannot be built: {why}{advice}") from None
 
 
 def _lock(model: pin.Model, active: set[str], posture: Mapping[str, float], parsed: Urdf) -> pin.Model:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from urllib.parse import unquote
 
-from cartctl.errors import UrdfError
+from cartctl.errors import UnsafeUrdfError
 
 
 @dataclass(frozen=True)
@@ -28,14 +28,14 @@ class MeshFolders:
         return cls(home, tuple(Path(d).resolve() for d in package_dirs))
 
     def find(self, filename: str) -> Path | None:
-        """The file behind ``filename``, or None if it is missing; raises UrdfError if it climbs out."""
+        """The file behind ``filename``, or None if it is missing; raises UnsafeUrdfError if it climbs out."""
         candidates = list(self._candidates(filename))
         if not candidates:
             return None
         inside = [path for path, root in candidates if path.is_relative_to(root)]
         if not inside:
             allowed = ", ".join(sorted({str(root) for _, root in candidates})) or "none"
-            raise UrdfError(
+            raise UnsafeUrdfError(
                 f"mesh {filename!r} reaches outside the folders given to it ({allowed}); "
                 "pass the folder that holds it in package_dirs=[...]"
             )
@@ -46,11 +46,13 @@ class MeshFolders:
         scheme, _, rest = filename.partition("://") if "://" in filename else ("", "", filename)
         rest = unquote(rest) if scheme else rest
         if "\0" in rest:
-            raise UrdfError(f"mesh {filename!r} holds a NUL character; expected a file name")
+            raise UnsafeUrdfError(f"mesh {filename!r} holds a NUL character; expected a file name")
         if scheme in ("package", "model"):
             return self._in_package(rest.lstrip("/"))
         if scheme not in ("", "file"):
-            raise UrdfError(f"mesh {filename!r} has the scheme {scheme!r}; expected package://, file:// or a path")
+            raise UnsafeUrdfError(
+                f"mesh {filename!r} has the scheme {scheme!r}; expected package://, file:// or a path"
+            )
         roots = self._roots()
         if Path(rest).is_absolute():
             return [(Path(rest).resolve(), root) for root in roots]

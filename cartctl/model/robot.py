@@ -107,11 +107,12 @@ class Robot:
         return state
 
     def check_configuration(self, q: Any, name: str = "q") -> FloatArray:
-        """``q`` as a read-only (nq,) copy, on the configuration manifold; raises ShapeError, NonFiniteError, ConfigurationError."""
+        """``q`` as a read-only (nq,) copy, checked; raises ShapeError, NonFiniteError, ConfigurationError."""
         checked = checks.vector(name, q, self.nq)
         if not self.is_on_manifold(checked):
             raise ConfigurationError(
-                f"{name} holds a quaternion or a (cos, sin) pair without unit norm; expected pin.normalize(robot.model, q)"
+                f"{name} holds a quaternion or a (cos, sin) pair without unit norm; "
+                "expected pin.normalize(robot.model, q)"
             )
         return checked
 

@@ -86,6 +86,8 @@ class State:
         view = self.place(frame)
         if view.differentiated != self._stamp:
             J = _frame_jacobian(self._model, self._data, view.fid, _WORLD_ALIGNED)
+            if J.ndim == 1:  # with one joint, Pinocchio hands out a vector
+                J = J.reshape(6, 1)
             J.flags.writeable = False
             view.jacobian = J
             view.differentiated = self._stamp
@@ -130,7 +132,7 @@ class State:
     @property
     def com_jacobian(self) -> FloatArray:
         """``J_com`` (3, nv): velocity of the centre of mass = J_com v."""
-        return self._once("J_com", lambda: pin.jacobianCenterOfMass(self._model, self._data, self.q))
+        return self._once("J_com", lambda: pin.jacobianCenterOfMass(self._model, self._data, self.q).reshape(3, -1))
 
     @property
     def com_drift(self) -> FloatArray:
@@ -169,5 +171,6 @@ def _frozen(array: Any) -> FloatArray:
 
 
 def _symmetric(M: FloatArray) -> FloatArray:
-    """Crba fills the upper triangle only."""
+    """M with the lower triangle that crba leaves open; with one joint, Pinocchio hands out a vector."""
+    M = M.reshape(-1, 1) if M.ndim < 2 else M
     return np.triu(M) + np.triu(M, 1).T  # type: ignore[no-any-return]

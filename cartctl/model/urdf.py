@@ -14,7 +14,7 @@ from xml.etree.ElementTree import Element, ParseError, tostring
 from defusedxml import DefusedXmlException
 from defusedxml import ElementTree as SafeTree
 
-from cartctl.errors import UrdfError
+from cartctl.errors import MalformedUrdfError, MissingUrdfError, NoJointsError, UnsafeUrdfError, UrdfError
 from cartctl.model.meshes import MeshFolders
 
 MOVABLE = ("revolute", "continuous", "prismatic")
@@ -67,11 +67,13 @@ class Urdf:
 def read(path: Path) -> bytes:
     """The bytes of a URDF file; raises UrdfError where there is none."""
     if path.is_dir():
-        raise UrdfError(f"{path} is a folder; expected a .urdf file")
+        raise MissingUrdfError(f"{path} is a folder; expected a .urdf file")
     try:
         return path.read_bytes()
     except FileNotFoundError:
-        raise UrdfError(f"{path}: no such file; expected the path of a .urdf file or a name from cc.robots()") from None
+        raise MissingUrdfError(
+            f"{path}: no such file; expected the path of a .urdf file or a name from cc.robots()"
+        ) from None
     except OSError as error:
         raise UrdfError(f"{path} cannot be read: {error.strerror}") from None
 
@@ -80,14 +82,14 @@ def parse(data: str | bytes, label: str, folders: MeshFolders) -> Urdf:
     """Parse and check a URDF; raises UrdfError naming ``label`` and what is wrong with it."""
     root = _parse_xml(data, label)
     if root.tag != "robot":
-        raise UrdfError(f"{label}: the root element is <{root.tag}>; expected <robot>")
+        raise MalformedUrdfError(f"{label}: the root element is <{root.tag}>; expected <robot>")
     if any(str(e.tag).startswith("{http") and "xacro" in str(e.tag) for e in root.iter()):
         raise UrdfError(f"{label} is a xacro file; expand it first: xacro {label} > robot.urdf")
     _check_numbers(root, label)
     joints = _check_tree(root, label)
     movable = {name: kind for name, kind in joints.items() if kind in MOVABLE}
     if not movable:
-        raise UrdfError(
+        raise NoJointsError(
             f"{label} holds {len(joints)} joints, none that moves; expected revolute, continuous or prismatic ones"
         )
     urdf = Urdf(root, label, movable, _mimics(root, label, movable))
@@ -99,11 +101,11 @@ def _parse_xml(data: str | bytes, label: str) -> Element:
     try:
         return SafeTree.fromstring(data, forbid_dtd=False, forbid_entities=True, forbid_external=True)  # type: ignore[no-any-return]
     except DefusedXmlException as error:
-        raise UrdfError(f"{label} declares XML entities ({type(error).__name__}); expected plain URDF") from None
+        raise UnsafeUrdfError(f"{label} declares XML entities ({type(error).__name__}); expected plain URDF") from None
     except ParseError as error:
-        raise UrdfError(f"{label} is not well-formed XML: {error}") from None
+        raise MalformedUrdfError(f"{label} is not well-formed XML: {error}") from None
     except (ValueError, LookupError) as error:  # unknown encodings, stray NULs
-        raise UrdfError(f"{label} cannot be decoded: {error}") from None
+        raise MalformedUrdfError(f"{label} cannot be decoded: {error}") from None
 
 
 def _check_numbers(root: Element, label: str) -> None:

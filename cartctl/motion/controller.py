@@ -11,7 +11,7 @@ import numpy as np
 from cartctl import checks
 from cartctl.algebra.metric import as_metric
 from cartctl.checks import FloatArray, is_finite
-from cartctl.errors import ParameterError, ProblemError, UnsupportedProblem
+from cartctl.errors import NoTasksError, ParameterError, ProblemError, UnsupportedProblem
 from cartctl.levels import Command, Level, get_level
 from cartctl.model.limits import Limits
 from cartctl.model.robot import Robot
@@ -27,13 +27,14 @@ _METRICS: Final = ("identity", "inertia")
 class Controller:
     """A robot with tasks, highest priority first, resolved by one solver at one level.
 
-    tasks: a Task or several. solver: a name from :func:`cartctl.solvers`, or an instance. level: ``"velocity"``. limits:
+    tasks: one Task or more. solver: a name from :func:`cartctl.solvers`, or an instance. level: ``"velocity"``. limits:
     Limits, None (off), or by default the robot's own where the solver honours bounds, else off with one warning.
     objective: an Objective for the null space. metric: None or ``"identity"``, ``"inertia"`` (least kinetic energy), an
     (nv,) or (nv, nv) array, or a function of the State that returns one. dt: s, the step it is called with.
+    soft_start: s over which the objective rises to its full share, so that the null space does not start with a jump.
 
-    Raises ProblemError (no tasks), FrameNotFound, JointNotFound, SolverNotFound, LevelNotFound, UnsupportedProblem,
-    MetricError, ParameterError, NonFiniteError.
+    Raises NoTasksError, ProblemError, TimeStepError, FrameNotFound, JointNotFound, SolverNotFound, LevelNotFound,
+    UnsupportedProblem, MetricError, ParameterError, NonFiniteError.
     """
 
     def __init__(
@@ -46,6 +47,7 @@ class Controller:
         objective: Objective | None = None,
         metric: str | FloatArray | Callable[[State], FloatArray] | None = None,
         dt: float = 1e-3,
+        soft_start: float = 0.0,
     ) -> None:
         if not isinstance(robot, Robot):
             raise ParameterError(f"robot is a {type(robot).__name__}; expected a Robot from cc.load(...)")
@@ -56,15 +58,19 @@ class Controller:
         self.limits = usable_limits(limits, robot, self.solver, self.level)
         self.objective = _checked_objective(objective, self.solver)
         self.metric = metric
-        self.dt = checks.number("dt", dt, low=0.0, strict=True)
+        self.dt = checks.duration("dt", dt)
+        self.soft_start = checks.number("soft_start", soft_start, low=0.0)
         self._metric = _metric(metric, robot)
+        self.solver.prepare()
         self._state = State(robot)
         self._zeros = np.zeros(robot.nv)
         self._anchors: list[Any] | None = None
+        self._started: float | None = None
 
     def reset(self) -> None:
         """Forget all that lasts from step to step, as before the first one."""
         self._anchors = None
+        self._started = None
 
     def step(self, q: FloatArray, v: FloatArray | None = None, t: float = 0.0) -> Command:
         """The command at configuration q (nq,), velocity v (nv,) (zeros if None) and time t in s.
@@ -75,9 +81,18 @@ class Controller:
         state = self.observe(q, v, t)
         anchors = self._anchors if self._anchors is not None else [task.anchor(state) for task in self.tasks]
         metric = self._metric if self._metric is None or isinstance(self._metric, np.ndarray) else self._metric(state)
-        problem, references = self.level.problem(state, self.tasks, t, anchors, self.objective, metric)
-        self._anchors = anchors  # only now: a refused step leaves no trace
+        started = t if self._started is None else self._started
+        rise = 1.0 if self.objective is None else self._rise(t - started)
+        problem, references = self.level.problem(state, self.tasks, t, anchors, self.objective, rise, metric)
+        self._anchors, self._started = anchors, started  # only now: a refused step leaves no trace
         return self.level.command(self.solver.solve(problem), references)
+
+    def _rise(self, elapsed: float) -> float:
+        """The share of the objective that counts: 3 x^2 - 2 x^3 over the soft start, then 1."""
+        if elapsed >= self.soft_start:
+            return 1.0
+        x = max(elapsed, 0.0) / self.soft_start
+        return x * x * (3.0 - 2.0 * x)
 
     def observe(self, q: FloatArray, v: FloatArray | None = None, t: float = 0.0) -> State:
         """The controller's own State, moved to (q, v); valid until the next call. Raises as :meth:`step`."""
@@ -111,7 +126,7 @@ def _checked_tasks(tasks: Task | Sequence[Task], robot: Robot) -> tuple[Task, ..
     if not isinstance(tasks, Sequence):
         raise ProblemError(f"tasks is a {type(tasks).__name__}; expected a Task or a sequence of tasks")
     if not tasks:
-        raise ProblemError("tasks is empty; expected at least one Task, such as cc.FrameTask(robot.tool)")
+        raise NoTasksError("tasks is empty; expected at least one Task, such as cc.FrameTask(robot.tool)")
     for k, task in enumerate(tasks):
         if not isinstance(task, Task):
             raise ProblemError(f"tasks[{k}] is a {type(task).__name__}; expected a Task")

@@ -10,6 +10,7 @@ import pyarrow as pa
 import pyarrow.csv
 import pyarrow.parquet
 
+from cartctl.files import whole_file
 from cartctl.motion.run import Run
 
 
@@ -36,15 +37,15 @@ def table(run: Run) -> pa.Table:
 
 def to_csv(run: Run, path: Path) -> Path:
     """Write the table as CSV."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    pyarrow.csv.write_csv(table(run), str(path))
+    with whole_file(path) as part:
+        pyarrow.csv.write_csv(table(run), str(part))
     return path
 
 
 def to_parquet(run: Run, path: Path) -> Path:
     """Write the table as Parquet."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    pyarrow.parquet.write_table(table(run), str(path))
+    with whole_file(path) as part:
+        pyarrow.parquet.write_table(table(run), str(part))
     return path
 
 

@@ -30,7 +30,8 @@ def usable_limits(limits: Limits | RobotLimits | None, robot: Robot, solver: Sol
         if able:
             return robot.limits
         warnings.warn(
-            f"{_who(solver, level)} honours no limits; it runs without them (limits=None says so; run.metrics() counts violations)",
+            f"{_who(solver, level)} honours no limits; it runs without them "
+            "(limits=None says so; run.metrics() counts violations)",
             CartctlWarning,
             stacklevel=3,
         )

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from cartctl.checks import FloatArray
 from cartctl.errors import RunFileError
+from cartctl.files import whole_file
 from cartctl.model.robot import Robot
 
 if TYPE_CHECKING:
@@ -120,8 +121,8 @@ class Run:
 
         figure = plot_run(self)
         if path is not None:
-            Path(path).parent.mkdir(parents=True, exist_ok=True)
-            figure.savefig(path, dpi=150)
+            with whole_file(path) as part:
+                figure.savefig(part, dpi=150, format=Path(path).suffix[1:] or "png")
         return figure
 
     def html(self, path: str | os.PathLike[str]) -> Path:

@@ -11,7 +11,7 @@ import numpy as np
 
 from cartctl import checks
 from cartctl.checks import FloatArray
-from cartctl.errors import ParameterError, RunInterrupted
+from cartctl.errors import RunInterrupted, TimeStepError
 from cartctl.motion.controller import Controller
 from cartctl.motion.recorder import Recorder
 from cartctl.motion.run import Run
@@ -31,14 +31,14 @@ def simulate(
 ) -> Run:
     """Run ``controller`` from q0 (nq,) (home if None) for ``duration`` s in steps of controller.dt: a Run.
 
-    Kinematic: the robot moves exactly as commanded, ``q <- q (+) v dt``. The controller is reset first. progress(k, n) is
-    called now and then with steps made and to make. save: a .npz file, written however the rollout ends.
+    Kinematic: the robot moves exactly as commanded, ``q <- q (+) v dt``. The controller is reset first. progress(k, n)
+    is called now and then with steps made and to make. save: a .npz file, written however the rollout ends.
 
-    Raises RunInterrupted on Ctrl-C, with every step made so far in ``.run``; ParameterError for a duration below one
+    Raises RunInterrupted on Ctrl-C, with every step made so far in ``.run``; TimeStepError for a duration below one
     step, and whatever :meth:`Controller.step` raises.
     """
     robot, dt = controller.robot, controller.dt
-    steps = _steps(checks.number("duration", duration, low=0.0, strict=True), dt)
+    steps = _steps(checks.duration("duration", duration), dt)
     q = robot.home if q0 is None else robot.check_configuration(q0, "q0")
     v = np.zeros(robot.nv) if v0 is None else checks.vector("v0", v0, robot.nv)
     controller.reset()
@@ -64,7 +64,7 @@ def _steps(duration: float, dt: float) -> int:
     """Whole steps that cover the duration, forgiving the round-off of duration / dt."""
     steps = int(np.ceil(duration / dt - 1e-9))
     if steps < 1:
-        raise ParameterError(f"duration is {duration:g} s; expected at least one step of {dt:g} s")
+        raise TimeStepError(f"duration is {duration:g} s; expected at least one step of {dt:g} s")
     return steps
 
 

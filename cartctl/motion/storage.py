@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
-import tempfile
 import zipfile
 from pathlib import Path
 from typing import Any
@@ -12,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from cartctl.errors import RunFileError
+from cartctl.files import whole_file
 from cartctl.motion.run import Run, TaskRecord
 
 _FORMAT = 1
@@ -23,7 +22,6 @@ def save(run: Run, path: Path) -> Path:
     """Write ``run``; the file appears whole or not at all."""
     if path.suffix != ".npz":
         path = path.with_name(path.name + ".npz")
-    path.parent.mkdir(parents=True, exist_ok=True)
     arrays: dict[str, Any] = {name: getattr(run, name) for name in _ARRAYS}
     names = sorted(set(run.status))
     header: dict[str, Any] = {"format": _FORMAT, "meta": run.meta, "status": names, "tasks": []}
@@ -33,7 +31,8 @@ def save(run: Run, path: Path) -> Path:
         header["tasks"].append({"name": task.name, "kind": task.kind, "frame": task.frame, "units": task.units})
         arrays.update({f"task{i}_{n}": getattr(task, n) for n in _TASK_ARRAYS if getattr(task, n) is not None})
     arrays["header"] = np.array(json.dumps(header))
-    _write(path, arrays)
+    with whole_file(path) as part, part.open("wb") as file:
+        np.savez_compressed(file, **arrays)
     return path
 
 
@@ -61,14 +60,3 @@ def load(path: Path) -> Run:
 def _task(i: int, entry: dict[str, Any], arrays: dict[str, Any]) -> TaskRecord:
     values: dict[str, Any] = {n: arrays.get(f"task{i}_{n}") for n in _TASK_ARRAYS}
     return TaskRecord(**entry, **values)
-
-
-def _write(path: Path, arrays: dict[str, Any]) -> None:
-    handle, name = tempfile.mkstemp(dir=path.parent, prefix=path.stem, suffix=".part")
-    try:
-        with os.fdopen(handle, "wb") as file:
-            np.savez_compressed(file, **arrays)
-        os.replace(name, path)
-    except BaseException:
-        Path(name).unlink(missing_ok=True)
-        raise

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import sys
 from importlib import import_module
+from types import ModuleType
 
 from cartctl.algebra.problem import Problem
 from cartctl.algebra.solution import Solution
@@ -67,3 +69,13 @@ def solve(problem: Problem, solver: str | Solver | type[Solver] = "pinv") -> Sol
     if not isinstance(problem, Problem):
         raise ParameterError(f"problem is a {type(problem).__name__}; expected a cc.Problem")
     return get_solver(solver).solve(problem)
+
+
+class _CallableModule(ModuleType):
+    """Lets ``cartctl.solvers`` be the package and ``cartctl.solvers()`` the list, in whatever order they come."""
+
+    def __call__(self) -> dict[str, str]:
+        return solvers()
+
+
+sys.modules[__name__].__class__ = _CallableModule

@@ -33,6 +33,10 @@ class Solver(ABC):
         self.check(problem)
         return self._solve_impl(problem)
 
+    def prepare(self) -> None:
+        """Do ahead what the first solve would otherwise wait for; nothing, unless a method has kernels to compile."""
+        return
+
     def check(self, problem: Problem) -> None:
         """Refuse what this method would have to ignore."""
         honours = self.honours

@@ -45,6 +45,10 @@ class DLS(EquationSolver):
             u = u + null_part(svd(A), round_off(A), u0)
         return Answer(u, False)
 
+    def prepare(self) -> None:
+        """Compile the kernel, or fetch it from its cache."""
+        _ = damped_kernel.compiled
+
     def grade(self, solution: Solution) -> Status:
         """SINGULAR where damping outweighs a direction, sigma_min < lambda; decided only when asked."""
         problem = solution.problem
@@ -66,7 +70,7 @@ def damped_solve(A: FloatArray, c: FloatArray, squared: float) -> FloatArray:
     return u
 
 
-@kernel
+@kernel("bool(matrix, vector, float, out_vector)")
 def damped_kernel(A: FloatArray, c: FloatArray, squared: float, u: FloatArray) -> bool:
     """Fill u by a Cholesky factorisation of the smaller normal matrix; False where a pivot is not positive."""
     m, n = A.shape

@@ -20,9 +20,9 @@ def pose_rows(axes: Any, size: int = 6) -> tuple[int, ...]:
     """
     rows = _named(axes) if isinstance(axes, str) else _masked(axes, size)
     if not rows or any(r >= size for r in rows):
-        allowed = "'pose', 'position', 'orientation', " if size == 6 else "'position', "
+        allowed = "'pose', 'position', 'orientation', 'z rx ry', " if size == 6 else "'position', "
         raise ParameterError(
-            f"axes is {axes!r}; expected {allowed}letters such as 'xy'{' or {!r}'.format('z rx ry') if size == 6 else ''}, "
+            f"axes is {axes!r}; expected {allowed}letters such as 'xy', "
             f"or a mask of {size} booleans with at least one True"
         )
     return rows

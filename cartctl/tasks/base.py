@@ -18,7 +18,7 @@ import numpy as np
 from cartctl import checks
 from cartctl.algebra.problem import FITS
 from cartctl.checks import FloatArray
-from cartctl.errors import ParameterError, ShapeError
+from cartctl.errors import ParameterError, ShapeError, TargetError
 from cartctl.model.robot import Robot
 from cartctl.model.state import State
 
@@ -60,6 +60,20 @@ class Task(ABC):
     def frame(self) -> str | None:
         """The frame that moves, where there is one."""
         return None
+
+    @property
+    def target(self) -> Any:
+        """Where the task is to go, as given; assign to change it. A target that is refused leaves the old one."""
+        return self._target
+
+    @target.setter
+    def target(self, value: Any) -> None:
+        self.take_target(value, f"task {self.name!r}: target")
+        self._target = value
+
+    def take_target(self, value: Any, label: str) -> None:
+        """Check a new target, keep what the task needs of it; raises TargetError, NonFiniteError naming ``label``."""
+        raise TargetError(f"{label}: a {type(self).__name__} takes no target")
 
     @abstractmethod
     def units(self, robot: Robot) -> list[str]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any, ClassVar
 
 import numpy as np
@@ -39,17 +38,9 @@ class ComTask(Task):
         self._index = np.array(self.rows)
         self.target = target
 
-    @property
-    def target(self) -> Any:
+    def take_target(self, value: Any, label: str) -> None:
         """A point (3,), a path, or None."""
-        return self._target
-
-    @target.setter
-    def target(self, value: Any) -> None:
-        target = point_target(value, f"task {self.name!r}: target", 3)
-        self._path: Callable[[float], Any] | None = target if callable(target) else None
-        self._point: FloatArray | None = None if callable(target) else target
-        self._target = value
+        self._point, self._path = point_target(value, label, 3)
 
     def units(self, robot: Robot) -> list[str]:
         """M."""

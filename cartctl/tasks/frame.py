@@ -19,13 +19,14 @@ class FrameTask(PoseTask):
     """Bring ``frame`` to a target pose in the world.
 
     frame: a name in robot.frame_names. axes: which rows, ``"pose"``, ``"position"``, ``"orientation"``, letters as in
-    ``"xy"`` or ``"z rx ry"``, or a mask of six. expressed_in: the axes the rows refer to, ``"world"`` or a frame (its own
-    name for tool axes); at the instant, J and e turned by R^T. gain: 1/s. target: pose, position, rotation, path or None
-    (hold what the first step finds; so too for the part a target leaves open). orientation: ``"angle-axis"``, or an Euler
-    sequence. length: m per rad, makes angular rows comparable with linear ones in weighted sums and singular values.
+    ``"xy"`` or ``"z rx ry"``, or a mask of six. expressed_in: the axes the rows refer to, ``"world"`` or a frame, its
+    own name for tool axes (J and e turned by R^T at the instant). gain: 1/s. target: pose, position, rotation, path, or
+    None: hold what the first step finds, as is done with the part that a target leaves open. orientation:
+    ``"angle-axis"`` or an Euler sequence. length: m per rad, makes angular rows comparable with linear ones in weighted
+    sums and singular values.
 
-    J and e are in LOCAL_WORLD_ALIGNED axes, linear first, m and rad. Raises ParameterError, TargetError, NonFiniteError;
-    FrameNotFound when a controller is made.
+    J and e are in LOCAL_WORLD_ALIGNED axes, linear first, m and rad. Raises ParameterError, TargetError,
+    NonFiniteError; FrameNotFound when a controller is made.
     """
 
     kind: ClassVar[str] = "frame"
@@ -44,25 +45,20 @@ class FrameTask(PoseTask):
         fit: str = "scale",
         name: str | None = None,
     ) -> None:
-        self._frame = frame
         self.expressed_in = expressed_in
         self._turned = expressed_in != "world"
-        super().__init__(axes, target, orientation, length, gain=gain, weight=weight, fit=fit, name=name or str(frame))
+        super().__init__(
+            frame, axes, target, orientation, length, gain=gain, weight=weight, fit=fit, name=name or str(frame)
+        )
         if self._turned and self._euler:
             raise ParameterError(
                 f"task {self.name!r}: expressed_in={expressed_in!r} with Euler angles; expected one or the other, "
                 "for Euler rates have no axes to be turned"
             )
 
-    @property
-    def frame(self) -> str:
-        """The frame that moves."""
-        return self._frame
-
     def check(self, robot: Robot) -> None:
         """Both frames must exist."""
         super().check(robot)
-        robot.frame_id(self._frame)
         if self._turned:
             robot.frame_id(self.expressed_in)
 

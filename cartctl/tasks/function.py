@@ -49,14 +49,9 @@ class FunctionTask(Task):
         self.unit = checks.choice("unit", unit, ("", "m", "rad"))
         self.target = target
 
-    @property
-    def target(self) -> Any:
+    def take_target(self, value: Any, label: str) -> None:
         """(m,), a path, or None."""
-        return self._target
-
-    @target.setter
-    def target(self, value: Any) -> None:
-        self._target = point_target(value, f"task {self.name!r}: target")
+        self._point, self._path = point_target(value, label)
 
     def units(self, robot: Robot) -> list[str]:
         """The given unit, once a row; evaluates the function at home to count them."""
@@ -68,10 +63,8 @@ class FunctionTask(Task):
         state = robot.state(robot.home)
         m = len(self.value(state))
         self.jacobian(state)
-        if self._target is not None and not callable(self._target) and len(self._target) != m:
-            raise TargetError(
-                f"task {self.name!r}: target has shape {self._target.shape}; expected ({m},) as the value"
-            )
+        if self._point is not None and len(self._point) != m:
+            raise TargetError(f"task {self.name!r}: target has shape {self._point.shape}; expected ({m},) as the value")
 
     def value(self, state: State) -> FloatArray:
         """The function's value (m,)."""
@@ -107,10 +100,10 @@ class FunctionTask(Task):
     def reference(self, state: State, t: float, anchor: FloatArray | None) -> Reference:
         """Target minus value, and the target's rates."""
         value = self.value(state)
-        if not callable(self._target):
-            wanted = anchor if self._target is None else self._target
+        if self._path is None:
+            wanted = anchor if self._point is None else self._point
             return Reference(np.zeros_like(value) if wanted is None else wanted - value)
-        parts: Sequence[Any] = self._target(t)
+        parts: Sequence[Any] = self._path(t)
         if not isinstance(parts, Sequence) or len(parts) != 3:
             raise TargetError(
                 f"task {self.name!r}: the path must return (value, rate, acceleration), each ({len(value)},)"

@@ -44,15 +44,10 @@ class JointTask(Task):
         self.target = target
         self._known: tuple[Robot, NDArray[np.intp], FloatArray] | None = None
 
-    @property
-    def target(self) -> Any:
+    def take_target(self, value: Any, label: str) -> None:
         """(m,) coordinates, a path, or None."""
-        return self._target
-
-    @target.setter
-    def target(self, value: Any) -> None:
         size = None if self.joints is None else len(self.joints)
-        self._target = point_target(value, f"task {self.name!r}: target", size)
+        self._point, self._path = point_target(value, label, size)
 
     def units(self, robot: Robot) -> list[str]:
         """Rad or m, one a joint."""
@@ -61,8 +56,8 @@ class JointTask(Task):
     def check(self, robot: Robot) -> None:
         """The joints must exist and the target must have one value for each."""
         super().check(robot)
-        if self._target is not None and not callable(self._target):
-            self._expect(self._target, len(self._names(robot)))
+        if self._point is not None:
+            self._expect(self._point, len(self._names(robot)))
 
     def jacobian(self, state: State) -> FloatArray:
         """Rows of the identity, (m, nv)."""
@@ -79,11 +74,11 @@ class JointTask(Task):
     def reference(self, state: State, t: float, anchor: FloatArray | None) -> Reference:
         """Target minus coordinates, and the target's rates."""
         values = self._values(state)
-        if not callable(self._target):
-            held = self._target if self._target is not None else self._default(state.robot, anchor)
+        if self._path is None:
+            held = self._point if self._point is not None else self._default(state.robot, anchor)
             return Reference(self._shortest(state.robot, values - values if held is None else held - values))
         try:
-            wanted, rate, acceleration = (np.asarray(x, dtype=np.float64) for x in self._target(t))
+            wanted, rate, acceleration = (np.asarray(x, dtype=np.float64) for x in self._path(t))
         except (TypeError, ValueError):
             raise TargetError(
                 f"task {self.name!r}: the path must return (value, rate, acceleration), each (m,)"

@@ -40,6 +40,7 @@ class PoseTask(Task):
 
     def __init__(
         self,
+        frame: str,
         axes: Any,
         target: Any,
         orientation: str,
@@ -51,6 +52,7 @@ class PoseTask(Task):
         name: str,
     ) -> None:
         super().__init__(gain=gain, weight=weight, fit=fit, name=name)
+        self._frame = frame
         self.rows = pose_rows(axes)
         checks.choice("orientation", orientation, ("angle-axis", *EULER_SEQUENCES))
         self.orientation = orientation
@@ -64,16 +66,21 @@ class PoseTask(Task):
         self.target = target
 
     @property
-    def target(self) -> Any:
-        """A pose (pin.SE3 or 4x4), a position, a rotation, a path, or None: hold what the first step finds."""
-        return self._target
+    def frame(self) -> str:
+        """The frame that moves."""
+        return self._frame
 
-    @target.setter
-    def target(self, value: Any) -> None:
-        goal = pose_target(value, f"task {self.name!r}: target")
+    def take_target(self, value: Any, label: str) -> None:
+        """A pose (pin.SE3 or 4x4), a position, a rotation, a path, or None: hold what the first step finds."""
+        goal = pose_target(value, label)
         self._goal: Goal | None = goal if isinstance(goal, Goal) else None
         self._path: Callable[[float], Any] | None = None if isinstance(goal, Goal) else goal
-        self._target = value
+
+    def check(self, robot: Robot) -> None:
+        """Its frame must exist; compiles the error's kernel too, so that the first step need not wait for it."""
+        super().check(robot)
+        robot.frame_id(self._frame)
+        _ = pose_error.compiled
 
     def units(self, robot: Robot) -> list[str]:
         """M for linear rows, rad for angular ones."""

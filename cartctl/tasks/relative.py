@@ -39,20 +39,13 @@ class RelativeFrameTask(PoseTask):
         fit: str = "scale",
         name: str | None = None,
     ) -> None:
-        self._frame = frame
         self.reference_frame = reference_frame
         label = name or f"{frame} from {reference_frame}"
-        super().__init__(axes, target, orientation, length, gain=gain, weight=weight, fit=fit, name=label)
-
-    @property
-    def frame(self) -> str:
-        """The frame that moves."""
-        return self._frame
+        super().__init__(frame, axes, target, orientation, length, gain=gain, weight=weight, fit=fit, name=label)
 
     def check(self, robot: Robot) -> None:
         """Both frames must exist."""
         super().check(robot)
-        robot.frame_id(self._frame)
         robot.frame_id(self.reference_frame)
 
     def pose(self, state: State) -> tuple[FloatArray, FloatArray]:
@@ -68,7 +61,7 @@ class RelativeFrameTask(PoseTask):
         return np.concatenate([Rt @ linear, Rt @ (Jf[3:] - Jr[3:])])
 
     def pose_drift(self, state: State) -> FloatArray:
-        """``J_dot v`` (6,): relative acceleration at zero joint acceleration, Coriolis and centripetal terms included."""
+        """``J_dot v`` (6,): the relative acceleration at zero joint acceleration, Coriolis terms included."""
         af, ar = state.drift(self._frame), state.drift(self.reference_frame)
         vf, vr = state.twist(self._frame), state.twist(self.reference_frame)
         Rt, d, w = state.rotation(self.reference_frame).T, self._offset(state), vr[3:]

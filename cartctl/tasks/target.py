@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -55,15 +55,22 @@ def pose_target(value: Any, name: str) -> Goal | Callable[[float], Any]:
     )
 
 
-def point_target(value: Any, name: str, size: int | None = None) -> FloatArray | Callable[[float], Any] | None:
+class PointTarget(NamedTuple):
+    """A constant (m,), or a path; both None where nothing is asked for."""
+
+    point: FloatArray | None
+    path: Callable[[float], Any] | None
+
+
+def point_target(value: Any, name: str, size: int | None = None) -> PointTarget:
     """``value`` as a (size,) array, a path or None; raises TargetError, NonFiniteError."""
     if value is None or callable(value):
-        return value  # type: ignore[no-any-return]
+        return PointTarget(None, value)
     if np.ndim(value) == 0:
         value = [value]
     if np.ndim(value) != 1 or (size is not None and len(value) != size):
         raise TargetError(f"{name} has shape {np.shape(value)}; expected ({'m' if size is None else size},) or a path")
-    return checks.vector(name, value)
+    return PointTarget(checks.vector(name, value), None)
 
 
 def _rotation(R: FloatArray, name: str) -> FloatArray:
