@@ -15,11 +15,14 @@ from PIL import Image
 
 NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
 FLAGS = (
-    "--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking",
-    "--disable-component-update", "--disable-sync", "--disable-default-apps", "--disable-dev-shm-usage", "--hide-scrollbars",
+    "--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--hide-scrollbars",
+    "--disable-background-networking", "--disable-component-update", "--disable-sync", "--disable-default-apps",
+    "--disable-dev-shm-usage",
     "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--host-resolver-rules=MAP * ~NOTFOUND",
     "--enable-logging=stderr",
 )  # fmt: skip
+REQUEST = re.compile(r'"url":"((?!file:|data:|blob:|about:|chrome)[^"]*)"')
+OWN = re.compile(r"https?://[\w.-]*\.(google|googleapis|gvt1)\.com/")  # what the browser asks for by itself
 CONSOLE = re.compile(r"CONSOLE[:(\d)]*\] ?\"(.*)\", source:")
 
 
@@ -33,26 +36,31 @@ needs_chromium = pytest.mark.skipif(find() is None, reason=f"no Chromium on PATH
 
 @dataclass(frozen=True)
 class Shot:
-    """What a page looked like, (height, width, 3) uint8, and what it wrote to its console."""
+    """What a page looked like, (height, width, 3) uint8, wrote to its console, and asked of the network."""
 
     pixels: np.ndarray
     console: list[str]
+    requests: list[str]
 
 
-def shoot(page: Path, fragment: str = "", milliseconds: int = 1000, size: tuple[int, int] = (1280, 800), save: Path | None = None) -> Shot:
-    """Open ``page``, let ``milliseconds`` of its own clock pass, and take its picture (kept at ``save``)."""
+def shoot(page: Path, fragment: str = "", milliseconds: int = 1000, size: tuple[int, int] = (1280, 800)) -> Shot:
+    """Open ``page``, let ``milliseconds`` of its own clock pass, and take its picture."""
     program = find()
     assert program is not None, "mark the test with needs_chromium"
-    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
-        picture = save or Path(folder) / "page.png"
+    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as name:
+        folder = Path(name)
         done = subprocess.run(
-            [program, *FLAGS, f"--user-data-dir={folder}/profile", f"--window-size={size[0]},{size[1]}",
-             f"--virtual-time-budget={milliseconds}", f"--screenshot={picture}", page.resolve().as_uri() + fragment],
-            capture_output=True, text=True, timeout=120, check=False,
+            [program, *FLAGS, f"--user-data-dir={folder / 'profile'}", f"--window-size={size[0]},{size[1]}",
+             f"--virtual-time-budget={milliseconds}", f"--log-net-log={folder / 'net.json'}",
+             f"--screenshot={folder / 'page.png'}", page.resolve().as_uri() + fragment],
+            capture_output=True, text=True, errors="replace", timeout=120, check=False,
         )  # fmt: skip
-        assert picture.exists(), f"Chromium took no picture: {done.stderr[-2000:]}"
-        with Image.open(picture) as image:
-            return Shot(np.asarray(image.convert("RGB")), CONSOLE.findall(done.stderr))
+        assert (folder / "page.png").exists(), f"Chromium took no picture: {done.stderr[-2000:]}"
+        asked = set(REQUEST.findall((folder / "net.json").read_text(encoding="utf-8", errors="replace")))
+        with Image.open(folder / "page.png") as image:
+            pixels = np.asarray(image.convert("RGB"))
+    console = [line for line in CONSOLE.findall(done.stderr) if "GL Driver Message" not in line]
+    return Shot(pixels, console, sorted(url for url in asked if not OWN.match(url)))
 
 
 def share(shot: Shot, rgb: tuple[int, int, int], tolerance: int = 30) -> float:

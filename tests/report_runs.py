@@ -31,9 +31,7 @@ PLANAR = """<robot name="{x}">
 
 def robot_of(model: Any, visual: Any, tool: str, name: str | None = None) -> Robot:
     """Wrap a Pinocchio model and its visuals."""
-    robot = Robot(model, name=name, tool=tool, geometry=SimpleNamespace(visual=lambda _: visual))
-    robot.limits = robot.limits.replace(velocity_lower=-robot.limits.velocity_upper)
-    return robot
+    return Robot(model, name=name, tool=tool, geometry=SimpleNamespace(visual=lambda _: visual))
 
 
 def circle_run(robot: Robot, q: np.ndarray, radius: float, axes: tuple[int, int], duration: float = 2.0) -> Run:
@@ -47,14 +45,16 @@ def circle_run(robot: Robot, q: np.ndarray, radius: float, axes: tuple[int, int]
     for k in range(n + 1):
         s = 2 * np.pi * (k / n - np.sin(2 * np.pi * k / n) / (2 * np.pi))  # at rest at both ends
         goal = pin.SE3(start)
-        goal.translation = start.translation + radius * ((np.cos(s) - 1) * np.eye(3)[axes[0]] + np.sin(s) * np.eye(3)[axes[1]])
+        goal.translation[axes[0]] += radius * (np.cos(s) - 1)
+        goal.translation[axes[1]] += radius * np.sin(s)
         J = pin.computeFrameJacobian(model, data, q, frame, pin.LOCAL_WORLD_ALIGNED)
         pin.framesForwardKinematics(model, data, q)
         here = data.oMf[frame]
         e = np.concatenate([goal.translation - here.translation, pin.log3(goal.rotation @ here.rotation.T)])
         m = 6 if model.nv >= 6 else 3
         rows["sigma"].append(np.linalg.svd(J[:m], compute_uv=False))
-        for key, value in (("q", q), ("v", v), ("error", e[:m]), ("pose", pin.SE3ToXYZQUAT(here)), ("target", pin.SE3ToXYZQUAT(goal))):
+        poses = {"pose": pin.SE3ToXYZQUAT(here), "target": pin.SE3ToXYZQUAT(goal)}
+        for key, value in ({"q": q, "v": v, "error": e[:m]} | poses).items():
             rows[key].append(np.array(value))
         v = J[:m].T @ np.linalg.solve(J[:m] @ J[:m].T + 1e-6 * np.eye(m), 40.0 * e[:m])
         q = pin.integrate(model, q, v * dt)
@@ -65,8 +65,8 @@ def circle_run(robot: Robot, q: np.ndarray, radius: float, axes: tuple[int, int]
 def run_of(robot: Robot, dt: float, arrays: dict[str, np.ndarray], units: list[str]) -> Run:
     """Make a run of samples: q, v, error, sigma, pose, target, (N+1, ...) each."""
     n = len(arrays["q"]) - 1
-    record = TaskRecord(robot.tool, "frame", robot.tool, units, arrays["error"], np.ones(n), arrays["sigma"], arrays["pose"],
-                        arrays["target"])  # fmt: skip
+    record = TaskRecord(robot.tool, "frame", robot.tool, units, arrays["error"], np.ones(n), arrays["sigma"],
+                        arrays["pose"], arrays["target"])  # fmt: skip
     spent = 2e-5 * (1 + np.random.default_rng(3).exponential(0.2, n))
     meta = {"solver": "dls", "level": "velocity", "dt": dt, "robot_name": robot.name}
     return Run(meta=meta, time=dt * np.arange(n + 1), q=arrays["q"], v=arrays["v"], command=arrays["v"][:-1],

@@ -170,3 +170,29 @@ def test_the_pandas_fingers_move_together() -> None:
         for f in ("panda_leftfinger", "panda_rightfinger")
     )
     assert left[1] == pytest.approx(0.03) and right[1] == pytest.approx(-0.03)
+
+
+def test_the_icub_stands_upright_in_its_meshes() -> None:
+    """Its Collada files are Y_UP, which the mesh loader ignores: each foot's mesh must lie along the sole, not on end."""
+    robot = cc.load("icub")
+    shapes = {g.name: g for g in robot.visual_model.geometryObjects}
+    data, visual = robot.model.createData(), robot.visual_model
+    pin.forwardKinematics(robot.model, data, np.array(robot.home))
+    placements = visual.createData()
+    pin.updateGeometryPlacements(robot.model, data, visual, placements)
+    low, high = np.full(3, np.inf), np.full(3, -np.inf)
+    for i, shape in enumerate(visual.geometryObjects):
+        box = shape.geometry
+        box.computeLocalAABB()
+        corners = np.array(
+            [
+                [a, b, c]
+                for a in (box.aabb_local.min_[0], box.aabb_local.max_[0])
+                for b in (box.aabb_local.min_[1], box.aabb_local.max_[1])
+                for c in (box.aabb_local.min_[2], box.aabb_local.max_[2])
+            ]
+        )
+        world = corners @ placements.oMg[i].rotation.T + placements.oMg[i].translation
+        low, high = np.minimum(low, world.min(0)), np.maximum(high, world.max(0))
+    size = high - low
+    assert shapes and 0.85 < size[2] < 1.25 and size[2] > 1.3 * size[0]

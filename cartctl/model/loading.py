@@ -70,7 +70,7 @@ def load(
         home=posture,
         acceleration=entry.acceleration if entry else None,
         jerk=entry.jerk if entry else None,
-        geometry=Geometry(text),
+        geometry=Geometry(text, collada_y_up=entry is not None and entry.collada_y_up),
         spec={
             "source": label if entry else str(Path(source).resolve()),
             "package_dirs": [str(Path(d).resolve()) for d in package_dirs],

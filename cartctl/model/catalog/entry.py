@@ -24,7 +24,7 @@ class LibraryEntry:
     for (fingers, wheels).
     acceleration, jerk: pattern -> rad/s^2, rad/s^3 (m for slides), only what is published.
     sources: where "model", "tool", "home", "acceleration" and "jerk" come from.
-    root_joint: as in ``cc.load``.
+    root_joint: as in ``cc.load``. collada_y_up: its Collada meshes lie on their backs unless Y_UP is heeded.
     """
 
     name: str
@@ -37,6 +37,7 @@ class LibraryEntry:
     acceleration: Mapping[str, float] = field(default_factory=dict)
     jerk: Mapping[str, float] = field(default_factory=dict)
     root_joint: str = "fixed"
+    collada_y_up: bool = False
 
     def urdf_path(self) -> Path | None:
         """Return the URDF's file, None if it is generated; raises MissingDependencyError or UrdfError."""

@@ -77,6 +77,7 @@ _ICUB = LibraryEntry(
         "r_gripper of icub.urdf: in the right palm",
         "legs: half_sitting of icub.srdf; arms ours, elbows bent by 70 deg",
     ),
+    collada_y_up=True,
 )
 
 
