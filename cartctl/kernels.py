@@ -72,7 +72,7 @@ def _compile(function: Callable[P, R], signature: str) -> Callable[P, R]:
 
     returned, _, arguments = signature.rstrip(")").partition("(")
     types = _numba_type(returned)(*(_numba_type(name.strip()) for name in arguments.split(",")))
-    folder = _cache_folder()
+    folder = cache_folder()
     if folder is None:
         return numba.njit(types)(function)  # type: ignore[no-any-return]
     # numba reads the folder while it decorates; the setting is global, so it is put back for the caller's own functions
@@ -85,7 +85,7 @@ def _compile(function: Callable[P, R], signature: str) -> Callable[P, R]:
 
 
 @lru_cache(maxsize=1)
-def _cache_folder() -> Path | None:
+def cache_folder() -> Path | None:
     """Where compiled kernels are kept, or None where nothing can be written."""
     root = Path(os.environ.get("CARTCTL_CACHE_DIR") or user_cache_path("cartctl")) / "kernels"
     folder = root / _source_hash()

@@ -250,6 +250,16 @@ def test_a_failing_step_also_saves(tmp_path: Path) -> None:
     assert len(cc.Run.load(tmp_path / "run.npz")) == 5
 
 
+def test_a_rollout_without_a_step_leaves_an_older_file_alone(tmp_path: Path) -> None:
+    robot = planar()
+    good = cc.Controller(robot, cc.FrameTask("tool", "xy"), limits=None)
+    cc.simulate(good, duration=0.01, save=tmp_path / "run.npz")
+    bad = cc.Controller(robot, cc.JointTask("joint1", target=lambda t: ([np.nan], [0.0], [0.0])), limits=None)
+    with pytest.raises(NonFiniteError):
+        cc.simulate(bad, duration=0.01, save=tmp_path / "run.npz")
+    assert len(cc.Run.load(tmp_path / "run.npz")) == 10
+
+
 @pytest.mark.parametrize(
     ("options", "error"),
     [

@@ -46,16 +46,17 @@ def simulate(
     try:
         _roll(controller, recorder, q, v, progress)
     except KeyboardInterrupt:
-        run = recorder.finish(interrupted=True)
-        if save is not None:
-            run.save(save)
-        raise RunInterrupted(run) from None
+        raise RunInterrupted(_kept(recorder, save, interrupted=True)) from None
     except BaseException:
-        if save is not None:
-            recorder.finish(interrupted=True).save(save)
+        _kept(recorder, save, interrupted=True)
         raise
-    run = recorder.finish(interrupted=False)
-    if save is not None:
+    return _kept(recorder, save, interrupted=False)
+
+
+def _kept(recorder: Recorder, save: str | os.PathLike[str] | None, *, interrupted: bool) -> Run:
+    """What was made, saved if asked for; a rollout without a step leaves an older file alone."""
+    run = recorder.finish(interrupted=interrupted)
+    if save is not None and len(run):
         run.save(save)
     return run
 

@@ -1,0 +1,32 @@
+"""Damped: every direction gives way a little, the small ones most."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from cartctl import checks
+from cartctl.algebra.inverses.base import InversePolicy, damped_factors
+from cartctl.algebra.svd import numerical_rank
+from cartctl.checks import FloatArray
+
+
+@dataclass(frozen=True, slots=True)
+class Damped(InversePolicy):
+    """``phi = sigma / (sigma^2 + lambda^2)`` (Nakamura & Hanafusa 1986; Wampler 1986).
+
+    damping: lambda > 0, in the units of the task's singular values (m/rad for positions); ||u|| stays below
+    ||b|| / (2 lambda).
+    """
+
+    damping: float = 1e-2
+
+    def __post_init__(self) -> None:
+        checks.number("damping", self.damping, low=0.0, strict=True)
+
+    def factors(self, s: FloatArray, scale: float) -> FloatArray:
+        """phi(s); see the class."""
+        return damped_factors(s, self.damping**2)
+
+    def rank(self, s: FloatArray, scale: float) -> int:
+        """How many singular values lie above lambda, where damping takes less than half."""
+        return numerical_rank(s, self.damping)

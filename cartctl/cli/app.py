@@ -1,0 +1,46 @@
+"""The app itself: its verbs and ``--version``. Whatever is slow to import waits inside the verbs."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from cartctl import __version__
+from cartctl.cli.doctor import doctor
+from cartctl.cli.info import info
+from cartctl.cli.track import track
+
+_EXAMPLE = "Example:  cartctl track panda --open"
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"cartctl {__version__}")
+        raise typer.Exit
+
+
+app = typer.Typer(
+    name="cartctl",
+    no_args_is_help=True,
+    pretty_exceptions_show_locals=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+    epilog=_EXAMPLE,
+)
+
+
+@app.callback(epilog=_EXAMPLE)
+def cartctl(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version and end.")
+    ] = False,
+) -> None:
+    """Redundancy resolution for robots: from a URDF to a tracked path you can watch."""
+
+
+app.command(
+    epilog="Example:  cartctl track panda --path circle --radius 0.1 --open\n\n"
+    "Example:  cartctl track my_robot.urdf --frame gripper --axes position --solver dls"
+)(track)
+app.command(epilog="Example:  cartctl info panda")(info)
+app.command(epilog="Example:  cartctl doctor")(doctor)

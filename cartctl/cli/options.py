@@ -1,0 +1,114 @@
+"""The options of the verbs, with their help. Nothing here imports a robot."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from cartctl.cli.choices import OBJECTIVES, PATHS, PLANES, completion, robots, solver_names, words
+
+_HAND, _PATH, _METHOD, _RESULT = "The robot", "The path", "The method", "The result"
+
+ROBOT = typer.Argument(
+    metavar="ROBOT", help="A name from `cartctl info`, or a .urdf file.", autocompletion=completion(robots)
+)
+RobotName = Annotated[str, ROBOT]
+PackageDirs = Annotated[
+    list[Path] | None,
+    typer.Option(
+        "--package-dir",
+        metavar="DIR",
+        exists=True,
+        file_okay=False,
+        rich_help_panel=_HAND,
+        help="Where package:// names and meshes lie; repeatable.",
+    ),
+]
+RootJoint = Annotated[
+    str | None,
+    typer.Option(
+        "--root-joint", metavar="KIND", rich_help_panel=_HAND, help="fixed, planar or free_flyer.",
+        autocompletion=words(("fixed", "planar", "free_flyer")),
+    ),
+]  # fmt: skip
+Home = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--home", metavar="JOINT=VALUE", rich_help_panel=_HAND, help="Where a joint starts, in rad or m; repeatable."
+    ),
+]
+Frame = Annotated[
+    str | None,
+    typer.Option("--frame", metavar="NAME", rich_help_panel=_HAND, help="The frame that moves; by default the tool."),
+]
+Axes = Annotated[
+    str | None,
+    typer.Option(
+        "--axes", metavar="AXES", rich_help_panel=_HAND,
+        help="pose, position, orientation or letters such as xy or 'z rx ry'; by default all that the robot can move.",
+    ),
+]  # fmt: skip
+PathKind = Annotated[
+    str,
+    typer.Option(
+        "--path", metavar="KIND", rich_help_panel=_PATH, autocompletion=words(PATHS),
+        help="circle, line (there and back), ellipse, lissajous (an eight) or polygon (a square).",
+    ),
+]  # fmt: skip
+Size = Annotated[
+    float | None,
+    typer.Option(
+        "--radius", "--size", metavar="M", rich_help_panel=_PATH, help="Half its width in m; by default one that fits."
+    ),
+]
+Plane = Annotated[
+    str | None,
+    typer.Option(
+        "--plane", metavar="PLANE", rich_help_panel=_PATH, autocompletion=words(PLANES),
+        help="xy, xz or yz of the world (yx and so on: the other way round); by default one that fits.",
+    ),
+]  # fmt: skip
+Period = Annotated[float, typer.Option("--period", metavar="S", rich_help_panel=_PATH, help="Time of a lap in s.")]
+Laps = Annotated[int, typer.Option("--laps", metavar="N", rich_help_panel=_PATH, help="How many times round.")]
+SolverName = Annotated[
+    str,
+    typer.Option(
+        "--solver",
+        metavar="NAME",
+        rich_help_panel=_METHOD,
+        help="A name from `cartctl info`.",
+        autocompletion=completion(solver_names),
+    ),
+]
+LevelName = Annotated[
+    str, typer.Option("--level", metavar="NAME", rich_help_panel=_METHOD, help="What is commanded: velocity.")
+]
+Gain = Annotated[float, typer.Option("--gain", metavar="1/S", rich_help_panel=_METHOD, help="How fast errors decay.")]
+Damping = Annotated[
+    float | None,
+    typer.Option("--damping", metavar="LAMBDA", rich_help_panel=_METHOD, help="Of a damped solver such as dls."),
+]
+ObjectiveName = Annotated[
+    str | None,
+    typer.Option(
+        "--objective", metavar="NAME", rich_help_panel=_METHOD, autocompletion=words(OBJECTIVES),
+        help="What the redundancy is for: joint-range or none; by default joint-range where the solver can.",
+    ),
+]  # fmt: skip
+ObjectiveGain = Annotated[
+    float | None,
+    typer.Option("--objective-gain", metavar="K", rich_help_panel=_METHOD, help="How strongly; by default 100."),
+]
+Step = Annotated[float, typer.Option("--dt", metavar="S", rich_help_panel=_METHOD, help="Time step in s.")]
+Duration = Annotated[
+    float | None,
+    typer.Option(
+        "--duration", metavar="S", rich_help_panel=_METHOD, help="By default the path's own and 0.5 s to settle."
+    ),
+]
+OutDir = Annotated[Path, typer.Option("--out", metavar="DIR", rich_help_panel=_RESULT, help="Folder for the files.")]
+Csv = Annotated[bool, typer.Option("--csv", rich_help_panel=_RESULT, help="Write a .csv, too.")]
+Parquet = Annotated[bool, typer.Option("--parquet", rich_help_panel=_RESULT, help="Write a .parquet, too.")]
+Open = Annotated[bool, typer.Option("--open", rich_help_panel=_RESULT, help="Open the HTML page in a browser.")]
