@@ -17,8 +17,8 @@ from cartctl.errors import NonFiniteError, ParameterError, ShapeError, TimeStepE
 FloatArray = NDArray[np.float64]
 
 
-def _floats(name: str, value: Any) -> FloatArray:
-    """A fresh float64 array of ``value``."""
+def floats(name: str, value: Any) -> FloatArray:
+    """A fresh float64 array of ``value``; raises ShapeError where it is none."""
     try:
         raw = np.asarray(value)
         if raw.dtype.kind not in "fiub":
@@ -44,7 +44,7 @@ def vector(name: str, value: Any, size: int | None = None, *, infinite: bool = F
 
     ``infinite=True`` lets +-inf pass (bounds), never NaN.
     """
-    array = _floats(name, value)
+    array = floats(name, value)
     if array.ndim != 1 or (size is not None and array.shape[0] != size):
         want = f"({'n' if size is None else size},)"
         raise ShapeError(f"{name} has shape {array.shape}; expected {want}")
@@ -59,7 +59,7 @@ def vector(name: str, value: Any, size: int | None = None, *, infinite: bool = F
 
 def matrix(name: str, value: Any, rows: int | None = None, columns: int | None = None) -> FloatArray:
     """``value`` as a read-only (rows, columns) float64 copy, Fortran-ordered for LAPACK."""
-    array = _floats(name, value)
+    array = floats(name, value)
     if (
         array.ndim != 2
         or (rows is not None and array.shape[0] != rows)
@@ -81,7 +81,7 @@ def number(name: str, value: Any, *, low: float = -math.inf, high: float = math.
         if isinstance(value, (bool, str, bytes)):
             raise TypeError
         x = float(value)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise ParameterError(f"{name} is {_short(value)}; expected a number") from None
     if not math.isfinite(x):
         raise NonFiniteError(f"{name} is {x}; expected a finite number")

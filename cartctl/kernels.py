@@ -10,8 +10,10 @@ from __future__ import annotations
 import hashlib
 import logging
 import os
+import re
 import shutil
 from collections.abc import Callable
+from contextlib import suppress
 from functools import lru_cache
 from pathlib import Path
 from typing import Any, Generic, ParamSpec, TypeVar
@@ -22,6 +24,7 @@ P = ParamSpec("P")
 R = TypeVar("R")
 
 _KEPT_CACHES = 4
+_OURS = re.compile(r"[0-9a-f]{16}")
 _log = logging.getLogger("cartctl")
 
 
@@ -111,7 +114,11 @@ def _source_hash() -> str:
 
 
 def _prune(root: Path) -> None:
-    """Remove all but the caches used last."""
-    caches: list[Any] = sorted(root.iterdir(), key=lambda folder: folder.stat().st_mtime, reverse=True)
-    for folder in caches[_KEPT_CACHES:]:
+    """Remove all but the caches used last; what is not a cache of ours stays."""
+    caches = []
+    for folder in root.iterdir():
+        with suppress(OSError):
+            if _OURS.fullmatch(folder.name) and folder.is_dir() and not folder.is_symlink():
+                caches.append((folder.stat().st_mtime, folder))
+    for _, folder in sorted(caches, reverse=True)[_KEPT_CACHES:]:
         shutil.rmtree(folder, ignore_errors=True)

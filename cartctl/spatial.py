@@ -51,9 +51,11 @@ def velocity_conversion(R: FloatArray, p: FloatArray) -> FloatArray:
 
 def euler_angles(sequence: str, R: FloatArray) -> FloatArray:
     """The angles phi (3,) of rotation R (3, 3); at a gimbal lock one of the many, with the third angle zero."""
+    checks.choice("sequence", sequence, EULER_SEQUENCES)
+    R = checks.matrix("R", R, 3, 3)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # the lock is reported by euler_rates' determinant
-        return Rotation.from_matrix(R).as_euler(checks.choice("sequence", sequence, EULER_SEQUENCES))  # type: ignore[no-any-return]
+        return Rotation.from_matrix(R).as_euler(sequence)  # type: ignore[no-any-return]
 
 
 def euler_rates(sequence: str, phi: FloatArray) -> FloatArray:
@@ -63,6 +65,7 @@ def euler_rates(sequence: str, phi: FloatArray) -> FloatArray:
     ZYZ, cos(phi_2) = 0 for sequences like XYZ.
     """
     checks.choice("sequence", sequence, EULER_SEQUENCES)
+    phi = checks.vector("phi", phi, 3)
     R = np.eye(3)
     T = np.empty((3, 3))
     for k, (axis, angle) in enumerate(zip(sequence, phi, strict=True)):
@@ -80,7 +83,7 @@ def rotation_about(axis: FloatArray, angle: float) -> FloatArray:
 def log3(R: FloatArray) -> FloatArray:
     """The angle-axis vector of a rotation R (3, 3), (3,), rad, of length at most pi; exact at 0 and at pi."""
     error = np.empty(6)
-    pose_error(_ORIGIN, _EYE, _ORIGIN, np.ascontiguousarray(R), error)
+    pose_error(_ORIGIN, _EYE, _ORIGIN, checks.matrix("R", R, 3, 3), error)
     return error[3:]
 
 

@@ -5,6 +5,7 @@ Nothing here imports cartctl's solvers or algebra: what they compute is computed
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -80,15 +81,18 @@ def systems(draw, max_n=12, levels=1, deficient=True):
 def constrained_minimum(A, c, W=None, u0=None):
     """The u of least ``||u - u0||_W`` among the least-squares answers to ``A u = c``, from one KKT system.
 
-    The constraint is the normal equations, which always have an answer; the system is singular where A is, and
-    solved for its u, which is unique.
+    The constraint is the part of ``A u = c`` inside the range of A, r = rank A independent rows.
     """
     n = A.shape[1]
     W = full_metric(W, n)
     u0 = np.zeros(n) if u0 is None else np.asarray(u0)
-    G = A.T @ A
-    kkt = np.block([[W, G], [G, np.zeros((n, n))]])
-    return np.linalg.lstsq(kkt, np.concatenate([W @ u0, A.T @ c]), rcond=1e-12)[0][:n]
+    if 0 in A.shape:
+        return u0
+    U = np.linalg.svd(A)[0][:, : np.linalg.matrix_rank(A, tol=GAP)]
+    B = U.T @ A
+    r = B.shape[0]
+    kkt = np.block([[W, B.T], [B, np.zeros((r, r))]])
+    return np.linalg.solve(kkt, np.concatenate([W @ u0, U.T @ c]))[:n]
 
 
 def lexicographic(matrices, commands, W=None, u0=None):
@@ -120,6 +124,11 @@ def damped(A, c, lam, W=None, u0=None):
     return u if u0 is None else u + constrained_minimum(A, np.zeros(A.shape[0]), W, u0)
 
 
+def size(array):
+    """The Frobenius norm, at any magnitude: ``np.linalg.norm`` squares."""
+    return math.hypot(*np.ravel(array).tolist())
+
+
 def residual(equation, u, s=1.0):
     """``||A u + d - s b||`` element by element, without a matrix product."""
     total = 0.0
@@ -142,6 +151,12 @@ def rotation(axis, angle):
     """Through the quaternion, not Rodrigues."""
     x, y, z = np.sin(angle / 2.0) * np.asarray(axis)
     return pin.Quaternion(float(np.cos(angle / 2.0)), float(x), float(y), float(z)).matrix()
+
+
+def random_rotation(rng):
+    """A rotation, uniformly distributed."""
+    x, y, z, w = rng.normal(size=4)
+    return pin.Quaternion(w, x, y, z).normalized().matrix()
 
 
 @dataclass(frozen=True)
@@ -190,8 +205,8 @@ def random_chain(rng, n):
     for _ in range(n):
         axis = rng.normal(size=3)
         kind = "revolute" if rng.random() < 0.6 else "prismatic"
-        joints.append(Joint(kind, axis / np.linalg.norm(axis), pin.SE3.Random().rotation, rng.uniform(-0.5, 0.5, 3)))
-    return joints, pin.SE3.Random().rotation, rng.uniform(-0.3, 0.3, 3)
+        joints.append(Joint(kind, axis / np.linalg.norm(axis), random_rotation(rng), rng.uniform(-0.5, 0.5, 3)))
+    return joints, random_rotation(rng), rng.uniform(-0.3, 0.3, 3)
 
 
 def pinocchio_chain(joints, tool_R, tool_p):

@@ -17,5 +17,6 @@ LOG = 1e-13  # logarithms, absolute, rad
 JACOBIAN = 1e-12  # two ways to the same Jacobian, links of about a metre
 PROMISE = 1.0 + 1e-9  # slack on a bound that a policy promises
 DAMPED = 1e-8  # damped least squares with lambda of at least 1e-2 sigma_max
+NEARLY_UNDAMPED = 1e-5  # damped least squares with less, per unit of the answer
 MET = 1e-6  # an equation called met leaves no more than this of its command
 EPS = 2.0**-52

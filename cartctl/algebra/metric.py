@@ -15,6 +15,7 @@ from cartctl import checks
 from cartctl.checks import FloatArray
 from cartctl.errors import MetricError, ShapeError
 
+_EPS = float(np.finfo(np.float64).eps)
 _SYMMETRY = 1e-9  # relative to the largest entry: M(q) from a recursion is symmetric to 1e-15
 
 
@@ -23,7 +24,7 @@ def as_metric(value: Any, n: int, name: str = "metric") -> FloatArray:
 
     Raises ShapeError, NonFiniteError, MetricError.
     """
-    W = np.asarray(value)
+    W = checks.floats(name, value)
     if W.ndim == 1:
         diagonal = checks.vector(name, W, n)
         if not (diagonal > 0.0).all():
@@ -41,8 +42,10 @@ def as_metric(value: Any, n: int, name: str = "metric") -> FloatArray:
 
 
 def _factor(W: FloatArray, name: str) -> FloatArray:
+    n = W.shape[0]
     L, info = lapack.dpotrf(W, lower=1, clean=1)
-    if info != 0:
+    # of a semidefinite matrix, round-off may leave a pivot above zero
+    if info != 0 or (L.diagonal() ** 2 <= 8.0 * n * _EPS * W.diagonal()).any():
         smallest = float(np.linalg.eigvalsh(W)[0])
         raise MetricError(f"{name} has the eigenvalue {smallest:.3g}; expected a positive definite matrix")
     return L  # type: ignore[no-any-return]

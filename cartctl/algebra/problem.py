@@ -100,8 +100,7 @@ class Problem:
         if self.constraints is not None:
             put(self, "constraints", _constraints(self.constraints, n))
             _ordered("c_lower", self.constraints[1], "c_upper", self.constraints[2])
-        if self.lower is not None and self.upper is not None:
-            _ordered("lower", self.lower, "upper", self.upper)
+        _ordered("lower", self.lower, "upper", self.upper)
         if self.metric is not None:
             put(self, "metric", as_metric(self.metric, n))
         if self.reference is not None:
@@ -182,7 +181,10 @@ def _equation(k: int, given: Any) -> Equation:
 
 def _constraints(given: Any, n: int) -> tuple[FloatArray, FloatArray, FloatArray]:
     if not isinstance(given, Sequence) or len(given) != 3:
-        raise ProblemError("constraints: expected three arrays (C, c_lower, c_upper)")
+        size = f" of {len(given)}" if isinstance(given, Sequence) else ""
+        raise ProblemError(
+            f"constraints is a {type(given).__name__}{size}; expected three arrays (C, c_lower, c_upper)"
+        )
     C = checks.matrix("constraints C", given[0], columns=n)
     rows = C.shape[0]
     return (
@@ -192,8 +194,14 @@ def _constraints(given: Any, n: int) -> tuple[FloatArray, FloatArray, FloatArray
     )
 
 
-def _ordered(low_name: str, low: FloatArray, high_name: str, high: FloatArray) -> None:
-    bad = np.flatnonzero((low > high) | (low == np.inf) | (high == -np.inf))
+def _ordered(low_name: str, low: FloatArray | None, high_name: str, high: FloatArray | None) -> None:
+    for name, bound, closed in ((low_name, low, np.inf), (high_name, high, -np.inf)):
+        if bound is not None and (bound == closed).any():
+            i = int(np.argmax(bound == closed))
+            raise ProblemError(f"{name}[{i}] is {closed:g}, which leaves no room; expected a number or {-closed:g}")
+    if low is None or high is None:
+        return
+    bad = np.flatnonzero(low > high)
     if bad.size:
         i = int(bad[0])
         raise ProblemError(

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cartctl.algebra.problem import Problem
+from cartctl.algebra.svd import norm
 from cartctl.checks import FloatArray
 
 
@@ -17,6 +18,7 @@ class Status(Enum):
 
     OPTIMAL = "Every equation is met and the cost is minimal."
     INEXACT = "The equations cannot all be met at once; the residuals say by how much the least-squares answer misses."
+    DAMPED = "Damping holds back part of the commands; the residuals say how much."
     SINGULAR = (
         "A task lost rank here: motion in the lost directions is left out or damped; "
         "move away from the singularity or drop an axis."
@@ -82,7 +84,7 @@ class Solution:
         if self._residuals is None:
             pairs = zip(self.problem.equations, self.scales, strict=True)
             rows = [e.A @ self.u + (0.0 if e.drift is None else e.drift) - s * e.b for e, s in pairs]
-            self._residuals = np.array([float(np.linalg.norm(r)) for r in rows])
+            self._residuals = np.nan_to_num([norm(r) for r in rows], nan=np.inf, posinf=np.inf)
         return self._residuals
 
     @property

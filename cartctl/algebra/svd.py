@@ -8,9 +8,11 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from scipy.linalg import lapack
+from scipy.linalg import blas, lapack
 
 from cartctl.checks import FloatArray
+
+_nrm2 = blas.dnrm2
 
 # Rank and null-space decisions: singular values below this many units of round-off, relative to the scale of the
 # task's own matrix, are noise of forming and projecting that matrix.
@@ -53,8 +55,12 @@ def round_off(A: FloatArray) -> float:
 
 def scale(A: FloatArray) -> float:
     """The Frobenius norm of A: the scale its cutoffs are relative to, the same before and after projection."""
-    flat = A.ravel(order="K")
-    return float(np.sqrt(flat.dot(flat)))
+    return norm(A.ravel(order="K"))
+
+
+def norm(x: FloatArray) -> float:
+    """The Euclidean norm of a vector, by BLAS: it neither over- nor underflows where the squares do."""
+    return float(_nrm2(x)) if x.shape[0] else 0.0
 
 
 def numerical_rank(s: FloatArray, floor: float) -> int:

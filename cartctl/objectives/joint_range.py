@@ -28,7 +28,7 @@ class JointRange(Objective):
     _known: dict[int, tuple[FloatArray, FloatArray, bool]] = field(default_factory=dict, init=False, repr=False)
 
     def __post_init__(self) -> None:
-        checks.number("gain", self.gain, low=0.0, strict=True)
+        object.__setattr__(self, "gain", checks.number("gain", self.gain, low=0.0, strict=True))
 
     def value(self, state: State) -> float:
         """``H(q)``, no unit."""

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 LIMIT = "#7a1f1f"  # of the lines that mark a limit
 MARKED = {"m": (1e3, "Position error", "mm"), "rad": (1e3, "Orientation error", "mrad"), "": (1.0, "Error", "")}
-QUIET = ("OPTIMAL", "INEXACT")  # statuses of a step that went as it should
+QUIET = ("OPTIMAL", "INEXACT", "DAMPED")  # statuses of a step that went as it should
 DECADES = 9  # shown at most on a logarithmic axis, counted from its top
 
 

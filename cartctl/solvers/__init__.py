@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from importlib import import_module
+from inspect import isabstract
 from types import ModuleType
 
 from cartctl.algebra.problem import Problem
@@ -56,7 +57,7 @@ def get_solver(solver: str | Solver | type[Solver]) -> Solver:
         return solver
     if isinstance(solver, str):
         return solver_class(solver)()
-    if isinstance(solver, type) and issubclass(solver, Solver):
+    if isinstance(solver, type) and issubclass(solver, Solver) and not isabstract(solver):
         return solver()
     raise ParameterError(f"solver is {solver!r}; expected a name from cc.solvers() or a Solver instance")
 

@@ -18,6 +18,7 @@ import numpy as np
 from cartctl.algebra.metric import Whitening
 from cartctl.algebra.problem import Equation, Problem
 from cartctl.algebra.solution import Solution, Status
+from cartctl.algebra.svd import norm, scale
 from cartctl.checks import FloatArray, is_finite
 from cartctl.errors import UnsupportedProblem
 
@@ -71,45 +72,61 @@ class EquationSolver(Solver):
     """A method without bounds, written for W = I and ``A_k u = c_k`` with ``c_k = b_k - d_k``."""
 
     def _solve_impl(self, problem: Problem) -> Solution:
+        try:
+            answer = self._whitened(problem)
+        except FloatingPointError:  # LAPACK met infinities
+            answer = None
+        if answer is None or not is_finite(answer.u):
+            return Solution(problem, np.zeros(problem.n), self.name, status=Status.FAILED)
+        return Solution(problem, answer.u, self.name, self.grade, None, answer.lost_rank)
+
+    def _whitened(self, problem: Problem) -> Answer:
+        """The answer in the metric of the problem."""
         systems = [(e.A, e.rhs) for e in problem.equations]
         u0 = problem.reference
         if problem.metric is None:
-            answer = self._impl(systems, problem, u0)
-            u = answer.u
-        else:
-            white = Whitening(problem.metric)
-            systems = [(white.matrix(A), c) for A, c in systems]
-            answer = self._impl(systems, problem, None if u0 is None else white.forward(u0))
-            u = white.back(answer.u)
-        if not is_finite(u):
-            return Solution(problem, np.zeros(problem.n), self.name, status=Status.FAILED)
-        return Solution(problem, u, self.name, self.grade, None, answer.lost_rank)
+            return self._impl(systems, problem, u0)
+        white = Whitening(problem.metric)
+        systems = [(white.matrix(A), c) for A, c in systems]
+        answer = self._impl(systems, problem, None if u0 is None else white.forward(u0))
+        return Answer(white.back(answer.u), answer.lost_rank)
 
     @abstractmethod
     def _impl(self, systems: list[tuple[FloatArray, FloatArray]], problem: Problem, u0: FloatArray | None) -> Answer:
         """Minimise 1/2 ||u - u0||^2 over the answers to ``systems`` as this method sees them."""
 
+    @property
+    def damps(self) -> bool:
+        """Whether the method holds back part of a command that it could deliver."""
+        return False
+
     def grade(self, solution: Solution) -> Status:
-        """SINGULAR if a task lost rank, else OPTIMAL or INEXACT by the residuals."""
+        """SINGULAR if a task lost rank, else by the residuals."""
         if solution.lost_rank:
             return Status.SINGULAR
-        pairs = zip(solution.problem.equations, solution.residuals, strict=True)
-        return Status.OPTIMAL if all(r <= _slack(e, solution.u) for e, r in pairs) else Status.INEXACT
+        if all(_met(e, solution.u) for e in solution.problem.equations if e.weight > 0.0):
+            return Status.OPTIMAL
+        return Status.DAMPED if self.damps else Status.INEXACT
 
 
-def _slack(e: Equation, u: FloatArray) -> float:
-    """How large a residual round-off alone may leave."""
-    size = float(np.linalg.norm(e.A)) * float(np.linalg.norm(u)) + float(np.linalg.norm(e.rhs))
-    return 1e-9 * size
+def _met(e: Equation, u: FloatArray) -> bool:
+    """Whether ``A u = b - d`` up to what round-off may leave: of each row, and of a backward stable solve."""
+    rhs = e.rhs
+    stable = 64.0 * float(np.finfo(np.float64).eps) * scale(e.A) * norm(u)
+    with np.errstate(over="ignore", invalid="ignore"):
+        allowed = 1e-9 * (np.abs(e.A) @ np.abs(u) + np.abs(rhs)) + stable
+        return bool((np.abs(e.A @ u - rhs) <= allowed).all() and np.isfinite(allowed).all())
 
 
 def stack(
     systems: list[tuple[FloatArray, FloatArray]], equations: tuple[Equation, ...]
 ) -> tuple[FloatArray, FloatArray]:
-    """All equations as one ``(A, c)``, rows weighed by the square root of their equation's weight."""
+    """All equations as one ``(A, c)``, rows weighed by the root of their weight; those of weight 0 left out."""
     if len(systems) == 1 and equations[0].weight == 1.0:
         return systems[0]
-    roots = [e.weight**0.5 for e in equations]
-    A = np.concatenate([r * A for r, (A, _) in zip(roots, systems, strict=True)])
-    c = np.concatenate([r * c for r, (_, c) in zip(roots, systems, strict=True)])
+    kept = [(e.weight**0.5, A, c) for e, (A, c) in zip(equations, systems, strict=True) if e.weight > 0.0]
+    if not kept:
+        return np.zeros((0, systems[0][0].shape[1])), np.zeros(0)
+    A = np.concatenate([root * A for root, A, _ in kept])
+    c = np.concatenate([root * c for root, _, c in kept])
     return np.asfortranarray(A), c

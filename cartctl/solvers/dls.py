@@ -14,6 +14,7 @@ from typing import ClassVar
 import numpy as np
 
 from cartctl import checks
+from cartctl.algebra.inverses.base import damped_factors
 from cartctl.algebra.metric import Whitening
 from cartctl.algebra.nullspace import null_part
 from cartctl.algebra.problem import Problem
@@ -36,7 +37,7 @@ class DLS(EquationSolver):
     damping: float = 1e-2
 
     def __post_init__(self) -> None:
-        checks.number("damping", self.damping, low=0.0, strict=True)
+        object.__setattr__(self, "damping", checks.number("damping", self.damping, low=0.0, strict=True))
 
     def _impl(self, systems: list[tuple[FloatArray, FloatArray]], problem: Problem, u0: FloatArray | None) -> Answer:
         A, c = stack(systems, problem.equations)
@@ -49,30 +50,34 @@ class DLS(EquationSolver):
         """Compile the kernel, or fetch it from its cache."""
         _ = damped_kernel.compiled
 
+    @property
+    def damps(self) -> bool:
+        """Always."""
+        return True
+
     def grade(self, solution: Solution) -> Status:
-        """SINGULAR where damping outweighs a direction, sigma_min < lambda; decided only when asked."""
+        """SINGULAR where damping outweighs a direction, sigma_min < lambda, or round-off does; asked only now."""
         problem = solution.problem
         white = None if problem.metric is None else Whitening(problem.metric)
         systems = [(e.A if white is None else white.matrix(e.A), e.rhs) for e in problem.equations]
         A, _ = stack(systems, problem.equations)
         s = singular_values(A)
-        if s.shape[0] and s[-1] < self.damping:
+        if s.shape[0] and s[-1] < max(self.damping, round_off(A)):
             return Status.SINGULAR
-        overdetermined = A.shape[0] > A.shape[1]
-        return super().grade(solution) if overdetermined else Status.OPTIMAL
+        return super().grade(solution)
 
 
 def damped_solve(A: FloatArray, c: FloatArray, squared: float) -> FloatArray:
     """``argmin ||A u - c||^2 + squared ||u||^2``, (n,), A (m, n), squared > 0."""
     u = np.empty(A.shape[1])
     if not damped_kernel.compiled(A, c, squared, u):
-        return _by_filter(A, c, squared)  # squared below the round-off of A A^T: the filter factors are still exact
+        return _by_filter(A, c, squared)  # a pivot near the round-off of A A^T: the filter factors are still exact
     return u
 
 
 @kernel("bool(matrix, vector, float, out_vector)")
 def damped_kernel(A: FloatArray, c: FloatArray, squared: float, u: FloatArray) -> bool:
-    """Fill u by a Cholesky factorisation of the smaller normal matrix; False where a pivot is not positive."""
+    """Fill u by a Cholesky factorisation of the smaller normal matrix; False where a pivot is too small to trust."""
     m, n = A.shape
     k = min(m, n)
     G = np.empty((k, k))
@@ -95,13 +100,16 @@ def damped_kernel(A: FloatArray, c: FloatArray, squared: float, u: FloatArray) -
             for a in range(m):
                 total += A[a, i] * c[a]
             y[i] = total
+    largest = 0.0
+    for i in range(k):
+        largest = max(largest, G[i, i])
     for i in range(k):  # L L^T = G and L y = rhs in one sweep
         for j in range(i + 1):
             total = G[i, j]
             for a in range(j):
                 total -= G[i, a] * G[j, a]
             if i == j:
-                if not total > 0.0:
+                if not total > 1e-8 * largest:
                     return False
                 G[i, i] = np.sqrt(total)
             else:
@@ -128,5 +136,5 @@ def _by_filter(A: FloatArray, c: FloatArray, squared: float) -> FloatArray:
     decomposition = svd(A)
     s = decomposition.s
     k = s.shape[0]
-    phi = np.divide(s, s * s + squared, out=np.zeros_like(s), where=s > 0.0)
+    phi = damped_factors(s, squared)
     return decomposition.Vt[:k].T @ (phi * (decomposition.U.T @ c))  # type: ignore[no-any-return]

@@ -7,25 +7,24 @@ least kinetic energy.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import ClassVar
 
-from cartctl.algebra.inverses import InversePolicy, Truncated
 from cartctl.algebra.problem import Problem
 from cartctl.algebra.svd import scale, svd
 from cartctl.checks import FloatArray
-from cartctl.solvers.base import Answer, EquationSolver, stack
+from cartctl.solvers.base import Answer, stack
+from cartctl.solvers.policy import PolicySolver
 
 
 @dataclass(frozen=True)
-class Pinv(EquationSolver):
+class Pinv(PolicySolver):
     """Pseudo-inverse of all equations stacked: least residual, then least W-norm.
 
     policy: what becomes of small singular values.
     """
 
     name: ClassVar[str] = "pinv"
-    policy: InversePolicy = field(default_factory=Truncated)
 
     def _impl(self, systems: list[tuple[FloatArray, FloatArray]], problem: Problem, u0: FloatArray | None) -> Answer:
         A, c = stack(systems, problem.equations)

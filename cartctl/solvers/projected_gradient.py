@@ -6,19 +6,19 @@ round-off whatever policy solves the task, so u0 never moves the hand.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import ClassVar
 
-from cartctl.algebra.inverses import InversePolicy, Truncated
 from cartctl.algebra.nullspace import null_part
 from cartctl.algebra.problem import Problem
 from cartctl.algebra.svd import round_off, scale, svd
 from cartctl.checks import FloatArray
-from cartctl.solvers.base import Answer, EquationSolver, stack
+from cartctl.solvers.base import Answer, stack
+from cartctl.solvers.policy import PolicySolver
 
 
 @dataclass(frozen=True)
-class ProjectedGradient(EquationSolver):
+class ProjectedGradient(PolicySolver):
     """Pseudo-inverse plus the reference u0, projected onto the null space of all equations stacked.
 
     policy: what becomes of small singular values in the task's part.
@@ -26,7 +26,6 @@ class ProjectedGradient(EquationSolver):
 
     name: ClassVar[str] = "projected-gradient"
     honours: ClassVar[frozenset[str]] = frozenset({"reference"})
-    policy: InversePolicy = field(default_factory=Truncated)
 
     def _impl(self, systems: list[tuple[FloatArray, FloatArray]], problem: Problem, u0: FloatArray | None) -> Answer:
         A, c = stack(systems, problem.equations)

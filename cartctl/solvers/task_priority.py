@@ -7,20 +7,20 @@ orthonormal basis Z_k, and (A_k P)# = Z (A_k Z)#: no projector is ever multiplie
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
 
-from cartctl.algebra.inverses import InversePolicy, Truncated
 from cartctl.algebra.problem import Problem
 from cartctl.algebra.svd import numerical_rank, round_off, scale, svd
 from cartctl.checks import FloatArray
-from cartctl.solvers.base import Answer, EquationSolver
+from cartctl.solvers.base import Answer
+from cartctl.solvers.policy import PolicySolver
 
 
 @dataclass(frozen=True)
-class TaskPriority(EquationSolver):
+class TaskPriority(PolicySolver):
     """Strict priorities: each equation is met as well as the null space of those above it allows.
 
     policy: what becomes of small singular values; its cutoffs refer to each task's own matrix.
@@ -28,7 +28,6 @@ class TaskPriority(EquationSolver):
 
     name: ClassVar[str] = "task-priority"
     honours: ClassVar[frozenset[str]] = frozenset({"reference"})
-    policy: InversePolicy = field(default_factory=Truncated)
 
     def _impl(self, systems: list[tuple[FloatArray, FloatArray]], problem: Problem, u0: FloatArray | None) -> Answer:
         n = problem.n

@@ -8,6 +8,7 @@ choice of the filter factors phi. Null-space projectors never use it: they are t
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from typing import ClassVar
 
 import numpy as np
 
@@ -16,7 +17,12 @@ from cartctl.checks import FloatArray
 
 
 class InversePolicy(ABC):
-    """A choice of filter factors phi(sigma), applied to one right-hand side."""
+    """A choice of filter factors phi(sigma), applied to one right-hand side.
+
+    damps: whether a policy holds back directions that it could invert.
+    """
+
+    damps: ClassVar[bool] = True
 
     @abstractmethod
     def factors(self, s: FloatArray, scale: float) -> FloatArray:
@@ -39,4 +45,4 @@ class InversePolicy(ABC):
 def damped_factors(s: FloatArray, squared: FloatArray | float) -> FloatArray:
     """``sigma / (sigma^2 + squared)``, (k,); 0 where both are."""
     below = s * s + squared
-    return np.divide(s, below, out=np.zeros_like(s), where=below > 0.0)  # type: ignore[no-any-return]
+    return np.divide(s, below, out=np.zeros_like(s), where=below > 0.0)

@@ -21,7 +21,7 @@ class Damped(InversePolicy):
     damping: float = 1e-2
 
     def __post_init__(self) -> None:
-        checks.number("damping", self.damping, low=0.0, strict=True)
+        object.__setattr__(self, "damping", checks.number("damping", self.damping, low=0.0, strict=True))
 
     def factors(self, s: FloatArray, scale: float) -> FloatArray:
         """phi(s); see the class."""

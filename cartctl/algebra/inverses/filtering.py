@@ -26,9 +26,9 @@ class NumericalFiltering(InversePolicy):
     beta: float = 1e-4
 
     def __post_init__(self) -> None:
-        checks.number("damping", self.damping, low=0.0, strict=True)
-        checks.number("threshold", self.threshold, low=0.0, strict=True)
-        checks.number("beta", self.beta, low=0.0)
+        object.__setattr__(self, "damping", checks.number("damping", self.damping, low=0.0, strict=True))
+        object.__setattr__(self, "threshold", checks.number("threshold", self.threshold, low=0.0, strict=True))
+        object.__setattr__(self, "beta", checks.number("beta", self.beta, low=0.0))
 
     def factors(self, s: FloatArray, scale: float) -> FloatArray:
         """phi(s); see the class."""
@@ -40,4 +40,4 @@ class NumericalFiltering(InversePolicy):
 
     def _squared(self, s: FloatArray) -> FloatArray:
         shortfall = np.maximum(0.0, 1.0 - (s / self.threshold) ** 2)
-        return self.beta**2 + self.damping**2 * shortfall  # type: ignore[no-any-return]
+        return self.beta**2 + self.damping**2 * shortfall

@@ -24,8 +24,8 @@ class ManipulabilityDamped(InversePolicy):
     threshold: float = 0.03
 
     def __post_init__(self) -> None:
-        checks.number("damping", self.damping, low=0.0, strict=True)
-        checks.number("threshold", self.threshold, low=0.0, strict=True)
+        object.__setattr__(self, "damping", checks.number("damping", self.damping, low=0.0, strict=True))
+        object.__setattr__(self, "threshold", checks.number("threshold", self.threshold, low=0.0, strict=True))
 
     def factors(self, s: FloatArray, scale: float) -> FloatArray:
         """phi(s); see the class."""

@@ -27,7 +27,7 @@ class SelectivelyDamped(InversePolicy):
     limit: float = np.pi
 
     def __post_init__(self) -> None:
-        checks.number("limit", self.limit, low=0.0, strict=True)
+        object.__setattr__(self, "limit", checks.number("limit", self.limit, low=0.0, strict=True))
 
     def factors(self, s: FloatArray, scale: float) -> FloatArray:
         """1/sigma, 0 for a zero; the clamping depends on the right-hand side and is in :meth:`solve`."""
@@ -55,7 +55,7 @@ class SelectivelyDamped(InversePolicy):
         shortened = np.minimum(1.0, np.divide(gamma, largest, out=np.ones_like(gamma), where=largest > 0.0))
         total = shortened @ steps
         peak = float(np.abs(total).max())
-        return total if peak <= self.limit else total * (self.limit / peak)
+        return total if peak <= self.limit else total * (self.limit / peak)  # type: ignore[no-any-return]
 
     @staticmethod
     def _floor(scale: float) -> float:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+from typing import ClassVar
 
 from cartctl import checks
 from cartctl.algebra.inverses.base import InversePolicy
@@ -17,10 +19,13 @@ class Truncated(InversePolicy):
     cutoff: relative to the Frobenius norm of the task's own matrix, in [1e-13, 1).
     """
 
+    damps: ClassVar[bool] = False
     cutoff: float = 1e-10
 
     def __post_init__(self) -> None:
-        checks.number("cutoff", self.cutoff, low=1e-13, high=1.0)
+        object.__setattr__(
+            self, "cutoff", checks.number("cutoff", self.cutoff, low=1e-13, high=math.nextafter(1.0, 0.0))
+        )
 
     def factors(self, s: FloatArray, scale: float) -> FloatArray:
         """phi(s); see the class."""

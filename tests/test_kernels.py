@@ -1,0 +1,139 @@
+"""Kernels: the same numbers compiled and interpreted, a cache that can be moved, and none where none can be had."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests import tolerances as tol
+
+# Prints what the package's kernels answer, how often numba's cache was hit, and where it lies.
+PROGRAM = """
+import json, os, sys
+import numpy as np
+import cartctl as cc
+from cartctl import kernels, spatial
+from cartctl.solvers import dls
+import numba
+before = numba.config.CACHE_DIR
+rng = np.random.default_rng(3)
+answers = []
+for m, n in [(1, 1), (2, 5), (5, 2), (4, 4), (6, 7), (0, 3)]:
+    problem = cc.Problem([(rng.normal(size=(m, n)), rng.normal(size=m))])
+    answers += cc.solve(problem, cc.DLS(0.1)).u.tolist()
+singular = cc.Problem([([[1.0, 1.0], [1.0, 1.0]], [1.0, 2.0])])
+answers += cc.solve(singular, cc.DLS(1e-9)).u.tolist()
+for k in range(20):
+    axis = rng.normal(size=3)
+    angle = [0.0, 1e-9, 1.0, np.pi - 1e-9, np.pi][k % 5]
+    answers += spatial.log3(spatial.rotation_about(axis / np.linalg.norm(axis), angle)).tolist()
+stats = getattr(dls.damped_kernel.compiled, "stats", None)
+print(json.dumps({
+    "answers": answers,
+    "jit": not numba.config.DISABLE_JIT,
+    "hits": sum(stats.cache_hits.values()) if stats else 0,
+    "kept": numba.config.CACHE_DIR == before,
+    "own": str(kernels.__file__),
+}))
+"""
+
+
+def run(program=PROGRAM, user=None, **environment):
+    env = {**os.environ, **environment}
+    env["PYTHONPATH"] = os.pathsep.join(p for p in sys.path if p)
+    result = subprocess.run(
+        [sys.executable, "-c", program], env=env, user=user, capture_output=True, text=True, check=False
+    )
+    assert result.returncode == 0, result.stderr
+    assert not result.stderr, result.stderr
+    return json.loads(result.stdout)
+
+
+@pytest.fixture(scope="module")
+def cache(tmp_path_factory):
+    return tmp_path_factory.mktemp("cache")
+
+
+@pytest.fixture(scope="module")
+def compiled(cache):
+    """The first run with an empty cache of its own."""
+    return run(CARTCTL_CACHE_DIR=str(cache))
+
+
+def test_interpreted_and_compiled_agree(compiled, tmp_path):
+    interpreted = run(NUMBA_DISABLE_JIT="1", CARTCTL_CACHE_DIR=str(tmp_path))
+    assert compiled["jit"] and not interpreted["jit"]
+    assert len(compiled["answers"]) > 80
+    np.testing.assert_allclose(interpreted["answers"], compiled["answers"], rtol=tol.EXACT, atol=tol.EXACT)
+
+
+def test_the_cache_lies_where_it_is_told_to(compiled, cache):
+    folders = list((cache / "kernels").iterdir())
+    assert len(folders) == 1
+    assert list(folders[0].rglob("*.nbi")) and list(folders[0].rglob("*.nbc"))
+    beside = Path(compiled["own"]).parent
+    assert not list(beside.rglob("*.nbi")), "compiled kernels beside the sources"
+
+
+def test_the_second_process_compiles_nothing(compiled, cache):
+    assert compiled["hits"] == 0
+    again = run(CARTCTL_CACHE_DIR=str(cache))
+    assert again["hits"] > 0
+    np.testing.assert_array_equal(again["answers"], compiled["answers"])
+
+
+def test_numbas_own_setting_is_put_back(compiled):
+    assert compiled["kept"]
+
+
+def test_a_file_where_the_cache_should_be(compiled, tmp_path):
+    occupied = tmp_path / "occupied"
+    occupied.write_text("not a folder")
+    for place in (occupied, occupied / "below"):
+        np.testing.assert_array_equal(run(CARTCTL_CACHE_DIR=str(place))["answers"], compiled["answers"])
+    assert occupied.read_text() == "not a folder"
+
+
+@pytest.mark.skipif(os.name != "posix", reason="POSIX permissions")
+def test_a_cache_that_cannot_be_written(compiled, tmp_path):
+    tmp_path.chmod(0o500)
+    try:
+        if os.geteuid() == 0:  # root may write anywhere, until it looks at the cache as somebody else
+            program = "import os\nos.access = lambda path, mode: mode != os.W_OK\n" + PROGRAM
+        else:
+            program = PROGRAM
+        answer = run(program, CARTCTL_CACHE_DIR=str(tmp_path))
+    finally:
+        tmp_path.chmod(0o700)
+    np.testing.assert_array_equal(answer["answers"], compiled["answers"])
+    assert not list(tmp_path.rglob("*.nbi"))
+
+
+def test_old_caches_are_pruned_and_strangers_are_left_alone(compiled, tmp_path):
+    """A handful is kept, the current one always; what is no cache of ours is nobody's business."""
+    root = tmp_path / "kernels"
+    for k in range(8):
+        (root / f"{k:016x}").mkdir(parents=True)
+        os.utime(root / f"{k:016x}", (1000.0 + k, 1000.0 + k))
+    strangers = [root / f"my_kernels_{k}" for k in range(6)]
+    for folder in strangers:
+        folder.mkdir()
+        (folder / "gauss.cl").write_text("a week's work")
+        os.utime(folder, (10.0, 10.0))
+    (root / "dangling").symlink_to(tmp_path / "nowhere")
+    np.testing.assert_array_equal(run(CARTCTL_CACHE_DIR=str(tmp_path))["answers"], compiled["answers"])
+    assert all((folder / "gauss.cl").is_file() for folder in strangers)
+    left = {f.name for f in root.iterdir()} - {f.name for f in strangers} - {"dangling"}
+    assert len(left) <= 5 and f"{0:016x}" not in left
+    assert left - {f"{k:016x}" for k in range(8)}
+
+
+def test_importing_kernels_does_not_import_numba():
+    code = "import sys; import cartctl.solvers.dls, cartctl.spatial; print(int('numba' in sys.modules))"
+    assert run(code) == 0
