@@ -72,6 +72,7 @@ def test_every_error_is_a_cartctl_error_with_a_docstring() -> None:
 
 @pytest.mark.parametrize("first", ["", "import cartctl.solvers;", "from cartctl.solvers.dls import DLS;", "cc.solve;"])
 def test_the_package_of_solvers_and_their_list_share_a_name(first: str) -> None:
-    code = f"import cartctl as cc; {first} print(sorted(cc.solvers()))\nimport cartctl.solvers\ncc.solvers.solve, cc.solvers()"
+    code = f"import cartctl as cc; {first} print(sorted(cc.solvers()))\nimport cartctl.solvers\n"
+    code += "cc.solvers.solve, cc.solvers()"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert "'dls'" in done.stdout

@@ -173,7 +173,7 @@ def test_the_pandas_fingers_move_together() -> None:
 
 
 def test_the_icub_stands_upright_in_its_meshes() -> None:
-    """Its Collada files are Y_UP, which the mesh loader ignores: each foot's mesh must lie along the sole, not on end."""
+    """Its Collada files are Y_UP, which the mesh loader ignores; as loaded it lies in pieces, twice as deep as high."""
     robot = cc.load("icub")
     shapes = {g.name: g for g in robot.visual_model.geometryObjects}
     data, visual = robot.model.createData(), robot.visual_model

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from enum import Enum
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from cartctl.algebra.problem import Problem
-from cartctl.algebra.svd import norm
+from cartctl.algebra.problem import Equation, Problem
+from cartctl.algebra.svd import norm, scale
 from cartctl.checks import FloatArray
 
 
@@ -18,7 +18,13 @@ class Status(Enum):
 
     OPTIMAL = "Every equation is met and the cost is minimal."
     INEXACT = "The equations cannot all be met at once; the residuals say by how much the least-squares answer misses."
-    DAMPED = "Damping holds back part of the commands; the residuals say how much."
+    DAMPED = "The method holds back part of the commands (damping, or a gradient step); the residuals say how much."
+    SCALED = "The commands are slowed down to stay within the bounds; the scales say by how much."
+    OVERDETERMINED = (
+        "More rows are stacked than there are unknowns, so the added tasks disturb the first; "
+        "add at most n - m rows, or rank the tasks with task-priority."
+    )
+    INFEASIBLE = "No scale of the commands keeps the bounds; u is the answer without commands, clipped into the box."
     SINGULAR = (
         "A task lost rank here: motion in the lost directions is left out or damped; "
         "move away from the singularity or drop an axis."
@@ -29,21 +35,31 @@ class Status(Enum):
         return self.name
 
 
+class Method(Protocol):
+    """What a Solution asks of the solver that made it, if it is asked."""
+
+    def solve(self, problem: Problem) -> Solution:
+        """Another answer of the same method."""
+
+    def grade(self, solution: Solution) -> Status:
+        """How the answer went."""
+
+
 class Solution:
     """The answer of one solver to one problem.
 
     u: (n,). scales: (p,) in [0, 1], 1 where the method does not scale. saturated: (n,) -1 at the lower bound, +1 at
-    the upper, 0 free; saturated_rows the same for constraint rows. lost_rank: whether a task's matrix lost rank.
-    residuals, status and bound_violation are worked
-    out when asked for and kept.
+    the upper, 0 free; saturated_rows the same for constraint rows. lost_rank: whether a task's matrix lost rank. The
+    status, residuals, parts and multipliers are worked out when asked for.
     """
 
     __slots__ = (
-        "_grade",
+        "_method",
         "_residuals",
         "_saturated",
         "_scales",
         "_status",
+        "_task_part",
         "lost_rank",
         "problem",
         "solver",
@@ -55,7 +71,7 @@ class Solution:
         problem: Problem,
         u: FloatArray,
         solver: str,
-        grade: Callable[[Solution], Status] | None = None,
+        method: Method | None = None,
         status: Status | None = None,
         lost_rank: bool = False,
         scales: FloatArray | None = None,
@@ -64,12 +80,13 @@ class Solution:
         self.problem = problem
         self.u = u
         self.solver = solver
-        self._grade = grade
-        self._status = status
         self.lost_rank = lost_rank
+        self._method = method
+        self._status = status
         self._scales = scales
         self._saturated = saturated
         self._residuals: FloatArray | None = None
+        self._task_part: FloatArray | None = None
 
     @property
     def scales(self) -> FloatArray:
@@ -102,10 +119,46 @@ class Solution:
 
     @property
     def status(self) -> Status:
-        """How it went, as a Status."""
+        """How it went; by the residuals alone where the solver does not say."""
         if self._status is None:
-            self._status = Status.OPTIMAL if self._grade is None else self._grade(self)
+            by_residuals = Status.OPTIMAL if self.met else Status.INEXACT
+            self._status = by_residuals if self._method is None else self._method.grade(self)
         return self._status
+
+    @property
+    def met(self) -> bool:
+        """Whether every equation of positive weight holds, up to what round-off may leave."""
+        pairs = zip(self.problem.equations, self.scales, strict=True)
+        return all(_holds(e, s, self.u) for e, s in pairs if e.weight > 0.0)
+
+    @property
+    def task_part(self) -> FloatArray:
+        """(n,) what the tasks ask for: the answer of the same method with u0 = 0."""
+        if self._task_part is None:
+            if self.problem.reference is None or self._method is None:
+                self._task_part = self.u
+            else:
+                self._task_part = self._method.solve(self.problem.without_reference()).u
+        return self._task_part
+
+    @property
+    def null_part(self) -> FloatArray:
+        """(n,) what the reference u0 adds: u - task_part."""
+        return self.u - self.task_part
+
+    @property
+    def multipliers(self) -> list[FloatArray]:
+        """Lagrange multipliers lambda_k (m_k,) of the equations: ``W (u - u0) = sum_k A_k^T lambda_k``.
+
+        The ones of least norm where the rows depend on each other; a least-squares fit where the method does not
+        minimise ``(u - u0)^T W (u - u0)`` (damping, scaling, gradient steps).
+        """
+        p = self.problem
+        step = self.u if p.reference is None else self.u - p.reference
+        force = step if p.metric is None else p.metric * step if p.metric.ndim == 1 else p.metric @ step
+        A = np.concatenate([e.A for e in p.equations])
+        stacked = np.linalg.lstsq(A.T, force, rcond=None)[0] if A.size else np.zeros(A.shape[0])
+        return np.split(stacked, np.cumsum(p.sizes)[:-1])
 
     def bound_violation(self) -> float:
         """The largest amount by which u leaves the problem's bounds or constraint rows; 0 inside."""
@@ -122,3 +175,12 @@ class Solution:
 
     def __repr__(self) -> str:
         return f"Solution({self.solver}, {self.status.name}, u={np.array2string(self.u, precision=5)})"
+
+
+def _holds(e: Equation, s: float, u: FloatArray) -> bool:
+    """Whether ``A u + d = s b`` up to what round-off may leave: of each row, and of a backward stable solve."""
+    rhs = e.rhs if s == 1.0 else s * e.b - (0.0 if e.drift is None else e.drift)
+    stable = 64.0 * float(np.finfo(np.float64).eps) * scale(e.A) * norm(u)
+    with np.errstate(over="ignore", invalid="ignore"):
+        allowed = 1e-9 * (np.abs(e.A) @ np.abs(u) + np.abs(rhs)) + stable
+        return bool((np.abs(e.A @ u - rhs) <= allowed).all() and np.isfinite(allowed).all())

@@ -18,7 +18,6 @@ import numpy as np
 from cartctl.algebra.metric import Whitening
 from cartctl.algebra.problem import Equation, Problem
 from cartctl.algebra.solution import Solution, Status
-from cartctl.algebra.svd import norm, scale
 from cartctl.checks import FloatArray, is_finite
 from cartctl.errors import UnsupportedProblem
 
@@ -56,6 +55,19 @@ class Solver(ABC):
             f"solver {self.name!r} cannot honour {what}; use one that does ({others}) or pass {remedy}"
         )
 
+    @property
+    def damps(self) -> bool:
+        """Whether the method holds back part of a command that it could deliver."""
+        return False
+
+    def grade(self, solution: Solution) -> Status:
+        """How an answer of this method went, decided when somebody asks."""
+        if solution.lost_rank:
+            return Status.SINGULAR
+        if solution.met:
+            return Status.OPTIMAL
+        return Status.DAMPED if self.damps else Status.INEXACT
+
     @abstractmethod
     def _solve_impl(self, problem: Problem) -> Solution:
         """The method itself, on a problem that was checked."""
@@ -78,7 +90,7 @@ class EquationSolver(Solver):
             answer = None
         if answer is None or not is_finite(answer.u):
             return Solution(problem, np.zeros(problem.n), self.name, status=Status.FAILED)
-        return Solution(problem, answer.u, self.name, self.grade, None, answer.lost_rank)
+        return Solution(problem, answer.u, self.name, self, None, answer.lost_rank)
 
     def _whitened(self, problem: Problem) -> Answer:
         """The answer in the metric of the problem."""
@@ -94,28 +106,6 @@ class EquationSolver(Solver):
     @abstractmethod
     def _impl(self, systems: list[tuple[FloatArray, FloatArray]], problem: Problem, u0: FloatArray | None) -> Answer:
         """Minimise 1/2 ||u - u0||^2 over the answers to ``systems`` as this method sees them."""
-
-    @property
-    def damps(self) -> bool:
-        """Whether the method holds back part of a command that it could deliver."""
-        return False
-
-    def grade(self, solution: Solution) -> Status:
-        """SINGULAR if a task lost rank, else by the residuals."""
-        if solution.lost_rank:
-            return Status.SINGULAR
-        if all(_met(e, solution.u) for e in solution.problem.equations if e.weight > 0.0):
-            return Status.OPTIMAL
-        return Status.DAMPED if self.damps else Status.INEXACT
-
-
-def _met(e: Equation, u: FloatArray) -> bool:
-    """Whether ``A u = b - d`` up to what round-off may leave: of each row, and of a backward stable solve."""
-    rhs = e.rhs
-    stable = 64.0 * float(np.finfo(np.float64).eps) * scale(e.A) * norm(u)
-    with np.errstate(over="ignore", invalid="ignore"):
-        allowed = 1e-9 * (np.abs(e.A) @ np.abs(u) + np.abs(rhs)) + stable
-        return bool((np.abs(e.A @ u - rhs) <= allowed).all() and np.isfinite(allowed).all())
 
 
 def stack(
