@@ -31,6 +31,7 @@ lint: $(READY)  ## ruff and mypy
 
 bench: $(READY)  ## the time of one step, as ratios against raw calls in the same run
 	@$(BIN)/python benchmarks/step_time.py
+	@$(BIN)/python benchmarks/solver_time.py
 
 clean:  ## remove the environment, caches and output
 	rm -rf $(VENV) out .pytest_cache .mypy_cache .ruff_cache .hypothesis build dist

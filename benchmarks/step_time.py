@@ -10,27 +10,19 @@ is the median of the rounds' ratios against Pinocchio's computeFrameJacobian.
 from __future__ import annotations
 
 import argparse
-import csv
-import os
-import platform
 import statistics
 from collections.abc import Callable
-from datetime import date
-from importlib.metadata import version
 from pathlib import Path
-from time import perf_counter_ns
 
 import numpy as np
 import pinocchio as pin
-from rich.console import Console
-from rich.table import Table
+from harness import interleaved, save_rows, setting, show
 
 import cartctl as cc
 
 RESULTS = Path(__file__).parent / "results" / "step_time.csv"
 README = Path(__file__).parent.parent / "README.md"
 REFERENCE = "pin.computeFrameJacobian"
-ROUNDS, CALLS = 60, 300
 
 
 def candidates() -> dict[str, Callable[[], object]]:
@@ -59,21 +51,6 @@ def candidates() -> dict[str, Callable[[], object]]:
     return found
 
 
-def measure(functions: dict[str, Callable[[], object]]) -> dict[str, list[float]]:
-    """Us a call, one figure a round."""
-    times: dict[str, list[float]] = {name: [] for name in functions}
-    for function in functions.values():
-        for _ in range(50):  # compile and warm up
-            function()
-    for _ in range(ROUNDS):
-        for name, function in functions.items():
-            start = perf_counter_ns()
-            for _ in range(CALLS):
-                function()
-            times[name].append((perf_counter_ns() - start) / CALLS / 1e3)
-    return times
-
-
 def rows(times: dict[str, list[float]]) -> list[dict[str, str]]:
     """One row a candidate."""
     reference = times[REFERENCE]
@@ -88,11 +65,11 @@ def rows(times: dict[str, list[float]]) -> list[dict[str, str]]:
     ]
 
 
-def write_table(found: list[dict[str, str]], setting: dict[str, str]) -> None:
+def write_table(found: list[dict[str, str]], where: dict[str, str]) -> None:
     """Put the figures into the README, between its markers."""
     lines = ["| what | median us | x computeFrameJacobian |", "|---|---|---|"]
     lines += [f"| {row['what']} | {row['median_us']} | {row['ratio']} |" for row in found]
-    lines += ["", "Panda, 7 dof, 6D pose; " + ", ".join(f"{k} {v}" for k, v in setting.items()) + "."]
+    lines += ["", "Panda, 7 dof, 6D pose; " + ", ".join(f"{k} {v}" for k, v in where.items()) + "."]
     begin, end = "<!-- table: step_time -->\n", "<!-- /table -->"
     head, _, rest = README.read_text().partition(begin)
     README.write_text(head + begin + "\n".join(lines) + "\n" + end + rest.partition(end)[2])
@@ -103,27 +80,11 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--save", action="store_true", help=f"write {RESULTS.name} and the README's table")
     save = parser.parse_args().save
-    found = rows(measure(candidates()))
-    setting = {
-        "date": date.today().isoformat(),
-        "machine": f"{platform.machine()}, {os.cpu_count()} cores",
-        "python": platform.python_version(),
-        **{name: version(name) for name in ("cartctl", "pin", "numpy", "scipy", "numba")},
-    }
-    table = Table("what", "median us", "p90 us", f"x {REFERENCE}", title="One step on the Panda, 7 dof, 6D pose")
-    for row in found:
-        table.add_row(*row.values())
-    console = Console()
-    console.print(table)
-    console.print(", ".join(f"{k} {v}" for k, v in setting.items()), style="dim")
+    found = rows(interleaved(candidates()))
+    show(f"One step on the Panda, 7 dof, 6D pose; ratio to {REFERENCE}", found)
     if save:
-        RESULTS.parent.mkdir(exist_ok=True)
-        with RESULTS.open("w", newline="") as file:
-            writer = csv.DictWriter(file, [*found[0], *setting])
-            writer.writeheader()
-            writer.writerows({**row, **setting} for row in found)
-        write_table(found, setting)
-        console.print(f"written: {RESULTS.relative_to(Path.cwd()) if RESULTS.is_relative_to(Path.cwd()) else RESULTS}")
+        save_rows(RESULTS, found, setting())
+        write_table(found, setting())
 
 
 if __name__ == "__main__":

@@ -16,9 +16,29 @@ _HOMES = {
     "cartctl.errors": ("CartctlError", "CartctlWarning", "RunInterrupted"),
     "cartctl.algebra.problem": ("Equation", "Problem"),
     "cartctl.algebra.solution": ("Solution", "Status"),
-    "cartctl.algebra.inverses": ("Damped", "InversePolicy", "Truncated"),
+    "cartctl.algebra.inverses": (
+        "Damped",
+        "InversePolicy",
+        "ManipulabilityDamped",
+        "NumericalFiltering",
+        "SelectivelyDamped",
+        "SigmaDamped",
+        "Truncated",
+    ),
     "cartctl.solvers": ("EquationSolver", "Solver", "solve", "solvers"),
+    "cartctl.levels.metrics": ("JointLimitMetric",),
+    "cartctl.solvers.dls_manipulability": ("DLSManipulability",),
+    "cartctl.solvers.dls_sigma": ("DLSSigma",),
+    "cartctl.solvers.extended_jacobian": ("ExtendedJacobian",),
+    "cartctl.solvers.main_variables": ("MainVariables",),
+    "cartctl.solvers.numerical_filtering": ("NumericalFilteringSolver",),
     "cartctl.solvers.pinv": ("Pinv",),
+    "cartctl.solvers.reduced_gradient": ("ReducedGradient",),
+    "cartctl.solvers.reverse_priority": ("ReversePriority",),
+    "cartctl.solvers.sdls": ("SDLS",),
+    "cartctl.solvers.singularity_robust_priority": ("SingularityRobustPriority",),
+    "cartctl.solvers.task_scaling": ("TaskScaling",),
+    "cartctl.solvers.transpose": ("Transpose",),
     "cartctl.solvers.dls": ("DLS",),
     "cartctl.solvers.projected_gradient": ("ProjectedGradient",),
     "cartctl.solvers.task_priority": ("TaskPriority",),
@@ -64,6 +84,10 @@ __all__ = ["__version__", *sorted(_HOME_OF)]  # noqa: PLE0604 - names, from the 
 if TYPE_CHECKING:  # editors and mypy see what __getattr__ finds
     from cartctl.algebra.inverses import Damped as Damped
     from cartctl.algebra.inverses import InversePolicy as InversePolicy
+    from cartctl.algebra.inverses import ManipulabilityDamped as ManipulabilityDamped
+    from cartctl.algebra.inverses import NumericalFiltering as NumericalFiltering
+    from cartctl.algebra.inverses import SelectivelyDamped as SelectivelyDamped
+    from cartctl.algebra.inverses import SigmaDamped as SigmaDamped
     from cartctl.algebra.inverses import Truncated as Truncated
     from cartctl.algebra.problem import Equation as Equation
     from cartctl.algebra.problem import Problem as Problem
@@ -73,6 +97,7 @@ if TYPE_CHECKING:  # editors and mypy see what __getattr__ finds
     from cartctl.errors import CartctlWarning as CartctlWarning
     from cartctl.errors import RunInterrupted as RunInterrupted
     from cartctl.levels import Command as Command
+    from cartctl.levels.metrics import JointLimitMetric as JointLimitMetric
     from cartctl.model.library import robots as robots
     from cartctl.model.limits import Limits as Limits
     from cartctl.model.loading import load as load
@@ -104,9 +129,20 @@ if TYPE_CHECKING:  # editors and mypy see what __getattr__ finds
     from cartctl.solvers import solve as solve
     from cartctl.solvers import solvers as solvers
     from cartctl.solvers.dls import DLS as DLS
+    from cartctl.solvers.dls_manipulability import DLSManipulability as DLSManipulability
+    from cartctl.solvers.dls_sigma import DLSSigma as DLSSigma
+    from cartctl.solvers.extended_jacobian import ExtendedJacobian as ExtendedJacobian
+    from cartctl.solvers.main_variables import MainVariables as MainVariables
+    from cartctl.solvers.numerical_filtering import NumericalFilteringSolver as NumericalFilteringSolver
     from cartctl.solvers.pinv import Pinv as Pinv
     from cartctl.solvers.projected_gradient import ProjectedGradient as ProjectedGradient
+    from cartctl.solvers.reduced_gradient import ReducedGradient as ReducedGradient
+    from cartctl.solvers.reverse_priority import ReversePriority as ReversePriority
+    from cartctl.solvers.sdls import SDLS as SDLS
+    from cartctl.solvers.singularity_robust_priority import SingularityRobustPriority as SingularityRobustPriority
     from cartctl.solvers.task_priority import TaskPriority as TaskPriority
+    from cartctl.solvers.task_scaling import TaskScaling as TaskScaling
+    from cartctl.solvers.transpose import Transpose as Transpose
     from cartctl.tasks import ComTask as ComTask
     from cartctl.tasks import FrameTask as FrameTask
     from cartctl.tasks import FunctionTask as FunctionTask
@@ -118,6 +154,8 @@ if TYPE_CHECKING:  # editors and mypy see what __getattr__ finds
 
 
 def __getattr__(name: str) -> Any:
+    if name == "analysis":
+        return import_module("cartctl.analysis")
     if name not in _HOME_OF:
         raise AttributeError(f"module 'cartctl' has no attribute {name!r}")
     value = import_module("cartctl.solvers") if name == "solvers" else getattr(import_module(_HOME_OF[name]), name)

@@ -16,6 +16,8 @@ from cartctl.errors import NonFiniteError, ParameterError, ShapeError, TimeStepE
 
 FloatArray = NDArray[np.float64]
 
+LARGEST = 1e9  # of a configuration or rate: beyond it, forward kinematics has no digit left
+
 
 def floats(name: str, value: Any) -> FloatArray:
     """A fresh float64 array of ``value``; raises ShapeError where it is none."""
@@ -39,10 +41,12 @@ def _finite(name: str, array: FloatArray) -> FloatArray:
     return array
 
 
-def vector(name: str, value: Any, size: int | None = None, *, infinite: bool = False) -> FloatArray:
+def vector(
+    name: str, value: Any, size: int | None = None, *, infinite: bool = False, largest: float = math.inf
+) -> FloatArray:
     """``value`` as a read-only (size,) float64 copy; raises ShapeError, NonFiniteError.
 
-    ``infinite=True`` lets +-inf pass (bounds), never NaN.
+    ``infinite=True`` lets +-inf pass (bounds), never NaN. Magnitudes above ``largest`` raise ParameterError.
     """
     array = floats(name, value)
     if array.ndim != 1 or (size is not None and array.shape[0] != size):
@@ -53,6 +57,9 @@ def vector(name: str, value: Any, size: int | None = None, *, infinite: bool = F
             raise NonFiniteError(f"{name}[{int(np.argmax(np.isnan(array)))}] is nan; expected a number or +-inf")
     else:
         _finite(name, array)
+    if largest < math.inf and array.size and float(np.abs(array).max()) > largest:
+        i = int(np.abs(array).argmax())
+        raise ParameterError(f"{name}[{i}] is {array[i]:g}; expected a magnitude of at most {largest:g}")
     array.flags.writeable = False
     return array
 
@@ -103,6 +110,11 @@ def choice(name: str, value: Any, options: Sequence[str]) -> str:
     if not isinstance(value, str) or value not in options:
         raise ParameterError(f"{name} is {_short(value)}; expected one of {', '.join(map(repr, options))}")
     return value
+
+
+def is_moderate(array: FloatArray) -> bool:
+    """Whether a vector's norm is finite and at most LARGEST, in one product."""
+    return bool(array.dot(array) <= LARGEST * LARGEST)
 
 
 def is_finite(array: FloatArray) -> bool:

@@ -42,6 +42,14 @@ class UnsupportedProblem(CartctlError, ValueError):  # noqa: N818 - the public n
     """The chosen solver cannot honour something in the problem, and says so instead of ignoring it."""
 
 
+class SolverOutputError(CartctlError, ValueError):
+    """A solver of the user's returned something else than (n,) finite numbers."""
+
+
+class FileError(CartctlError, OSError):
+    """A file cannot be written."""
+
+
 class ParameterError(CartctlError, ValueError):
     """A parameter lies outside its domain: a negative gain, dt <= 0, an unknown option."""
 

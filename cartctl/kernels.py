@@ -12,8 +12,10 @@ import logging
 import os
 import re
 import shutil
-from collections.abc import Callable
-from contextlib import suppress
+import signal
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from functools import lru_cache
 from pathlib import Path
 from typing import Any, Generic, ParamSpec, TypeVar
@@ -47,8 +49,25 @@ class Kernel(Generic[P, R]):
         try:
             return self._compiled
         except AttributeError:
-            self._compiled: Callable[P, R] = _compile(self.function, self.signature)
+            with _deferred_interrupt():
+                self._compiled: Callable[P, R] = _compile(self.function, self.signature)
             return self._compiled
+
+
+@contextmanager
+def _deferred_interrupt() -> Iterator[None]:
+    """Hold back Ctrl-C while compiling: inside the compiler's callbacks it would be swallowed."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    caught: list[int] = []
+    before = signal.signal(signal.SIGINT, lambda number, frame: caught.append(number))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+        if caught:
+            raise KeyboardInterrupt
 
 
 def kernel(signature: str) -> Callable[[Callable[P, R]], Kernel[P, R]]:
@@ -77,12 +96,12 @@ def _compile(function: Callable[P, R], signature: str) -> Callable[P, R]:
     types = _numba_type(returned)(*(_numba_type(name.strip()) for name in arguments.split(",")))
     folder = cache_folder()
     if folder is None:
-        return numba.njit(types)(function)  # type: ignore[no-any-return]
+        return numba.njit(types, error_model="numpy")(function)  # type: ignore[no-any-return]
     # numba reads the folder while it decorates; the setting is global, so it is put back for the caller's own functions
     before = numba.config.CACHE_DIR
     numba.config.CACHE_DIR = str(folder)
     try:
-        return numba.njit(types, cache=True)(function)  # type: ignore[no-any-return]
+        return numba.njit(types, cache=True, error_model="numpy")(function)  # type: ignore[no-any-return]
     finally:
         numba.config.CACHE_DIR = before
 

@@ -14,6 +14,13 @@ from hypothesis import strategies as st
 from scipy.linalg import null_space
 
 SEEDS = st.integers(0, 2**32 - 1)
+
+
+def magnitudes(low, high):
+    """Numbers of every order of magnitude from low to high alike."""
+    return st.floats(math.log10(low), math.log10(high)).map(lambda exponent: 10.0**exponent)
+
+
 GAP = 1e-8  # ranks of the random problems below are clear: singular values are above 0.1 or round-off
 
 

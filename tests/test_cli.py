@@ -509,6 +509,67 @@ def test_info_shows_one_robot() -> None:
     assert "home from" in result.stdout and "acceleration from" in result.stdout
 
 
+def test_info_analyses_the_hand_at_home() -> None:
+    result = cartctl("info", "panda")
+    robot = cc.load("panda")
+    s = np.linalg.svd(robot.state(robot.home).jacobian(robot.tool), compute_uv=False)
+    assert "x y z rx ry rz at home: rank 6 of 6, degree of redundancy 1" in result.stdout
+    shown = line_of("singular values", result.stdout)
+    assert [float(x) for x in shown.split()] == pytest.approx(s, rel=5e-3)
+    assert float(line_of("condition", result.stdout)) == pytest.approx(s[0] / s[-1], rel=5e-3)
+    assert float(line_of("manipulability", result.stdout)) == pytest.approx(np.prod(s), rel=5e-3)
+    assert "lost" not in result.stdout and "determinant" not in result.stdout
+    assert len(re.findall(r"^velocity ellipsoid .* (?:m|rad)/s *$", result.stdout, re.MULTILINE)) == 2
+
+
+def test_info_analyses_a_given_configuration(arm: str) -> None:
+    """Stretched along the axis of the shoulder: 0 velocity and any force along x, at 0.5 + 0.4 + 0.3 m."""
+    Path(arm).write_text(arm_text(bend=-0.4))
+    result = cartctl("info", arm, "--home", "shoulder=0", "--home", "elbow=0", "--home", "wrist=0")
+    assert result.exit_code == 0, result.output
+    assert_readable(result.stdout)
+    assert line_of("its Jacobian", result.stdout) == "x y at home: rank 1 of 2, degree of redundancy 2"
+    assert line_of("lost", result.stdout) == "x"
+    reach = np.linalg.norm([1.2, 0.7, 0.3])
+    assert line_of("velocity ellipsoid", result.stdout) == f"{number(reach)}  0 m/s"
+    assert line_of("force ellipsoid", result.stdout) == f"any  {number(1.0 / reach)} N"
+    assert "condition" not in result.stdout
+
+
+def test_info_of_other_frames_and_axes(arm: str) -> None:
+    square = cartctl("info", arm, "--axes", "xy rz")
+    robot = cc.load(arm)
+    J = robot.state(robot.home).jacobian("tip")[[0, 1, 5]]
+    assert float(line_of("determinant", square.stdout)) == pytest.approx(np.linalg.det(J), rel=5e-3)
+    assert line_of("its Jacobian", square.stdout) == "x y rz at home: rank 3 of 3, degree of redundancy 0"
+    elbow = cartctl("info", arm, "--frame", "l2")
+    assert line_of("frame", elbow.stdout) == "l2" and "rank 1 of 1" in line_of("its Jacobian", elbow.stdout)
+    still = cartctl("info", arm, "--frame", "base")
+    assert still.exit_code == 0 and line_of("lost", still.stdout) == "x, y, z, rx, ry, rz"
+
+
+def line_of(name: str, text: str) -> str:
+    """What stands beside a name."""
+    found = re.search(rf"^{name}  +(.*?) *$", text, re.MULTILINE)
+    assert found, text
+    return found[1]
+
+
+@pytest.mark.parametrize(
+    ("args", "words"),
+    [
+        (["panda", "--home", "panda_joint1"], "--home is 'panda_joint1'"),
+        (["panda", "--home", "panda_jont1=1"], "did you mean 'panda_joint1'"),
+        (["panda", "--frame", "panda_hnd"], "did you mean 'panda_hand'"),
+        (["panda", "--axes", "xq"], "axes is 'xq'"),
+        (["--home", "elbow=1"], "--home is given without a robot"),
+        (["--frame", "tip"], "--frame is given without a robot"),
+    ],
+)
+def test_bad_options_of_info_are_one_line(args: list[str], words: str) -> None:
+    assert words in the_error(cartctl("info", *args))
+
+
 def test_info_unfolds_all_frames() -> None:
     shown = cartctl("info", "panda", "--frames").stdout.split()
     assert set(cc.load("panda").frame_names) <= set(shown)

@@ -15,7 +15,7 @@ from cartctl.errors import CartctlError, NonFiniteError, ParameterError
 from tests import oracles
 from tests import tolerances as tol
 
-DAMPINGS = st.floats(3e-2, 3.0)
+DAMPINGS = oracles.magnitudes(3e-2, 3.0)
 
 
 @given(oracles.systems(max_n=40), DAMPINGS, oracles.METRICS)
@@ -97,7 +97,7 @@ def test_rank_lost_to_round_off_is_singular(seed, size, lam):
     assert np.linalg.norm(solution.u) <= np.linalg.norm(c) / (2.0 * lam) * tol.PROMISE
 
 
-@given(oracles.SEEDS, st.floats(1e-14, 1e-1), st.floats(1e-3, 1.0))
+@given(oracles.SEEDS, oracles.magnitudes(1e-14, 1e-1), oracles.magnitudes(1e-3, 1.0))
 def test_bounded_through_singularities(seed, smallest, lam):
     rng = np.random.default_rng(seed)
     m, n = (int(k) for k in rng.integers(2, 9, 2))

@@ -14,7 +14,15 @@ import pyarrow.parquet
 import pytest
 
 import cartctl as cc
-from cartctl.errors import CartctlError, NonFiniteError, ParameterError, RunFileError, ShapeError
+from cartctl.errors import (
+    CartctlError,
+    FileError,
+    NonFiniteError,
+    ParameterError,
+    RunFileError,
+    ShapeError,
+    TimeStepError,
+)
 from tests.robots_for_tests import ROBOTS, panda, planar
 
 
@@ -285,3 +293,53 @@ def test_steps_are_counted_without_round_off() -> None:
     run = cc.simulate(controller, duration=0.3, t0=2.0, progress=lambda k, n: told.append((k, n)))
     assert len(run) == 300 and run.time[0] == 2.0 and run.time[-1] == pytest.approx(2.3, abs=1e-12)
     assert told[-1] == (300, 300)
+
+
+def test_a_failure_that_persists_also_saves(tmp_path: Path) -> None:
+    robot, calls = planar(), [0]
+
+    def height(state: cc.State) -> float:
+        calls[0] += 1
+        if calls[0] > 30:
+            raise RuntimeError("sensor gone")
+        return state.position("tool")[1]
+
+    task = cc.FunctionTask(height, lambda s: s.jacobian("tool")[1])
+    with pytest.raises(RuntimeError, match="sensor gone"):
+        cc.simulate(cc.Controller(robot, task, limits=None), duration=1.0, save=tmp_path / "run.npz")
+    assert len(cc.Run.load(tmp_path / "run.npz")) > 2
+
+
+@pytest.mark.parametrize(("dt", "duration"), [(1e-300, 1.0), (1e-9, 1e9), (1e-3, 1e300)])
+def test_more_steps_than_can_be_kept_are_refused(dt: float, duration: float) -> None:
+    controller = cc.Controller(planar(), cc.FrameTask("tool", "xy"), limits=None, dt=dt)
+    with pytest.raises(TimeStepError, match="steps"):
+        cc.simulate(controller, duration=duration)
+
+
+def test_a_tampered_run_is_refused(circle: cc.Run, tmp_path: Path) -> None:
+    path = circle.save(tmp_path / "run.npz")
+    with np.load(path) as file:
+        arrays = dict(file)
+    for change in ({"time": arrays["time"][:-5]}, {"q": np.full_like(arrays["q"], np.nan)}, {"v": arrays["v"][:3]}):
+        np.savez(tmp_path / "bad.npz", **(arrays | change))
+        with pytest.raises(RunFileError, match="bad.npz"):
+            cc.Run.load(tmp_path / "bad.npz")
+
+
+def test_files_that_cannot_be_written_are_named(circle: cc.Run, tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    for write in (circle.save, circle.to_csv, circle.to_parquet, circle.plot, circle.html):
+        with pytest.raises(FileError, match="cannot be written"):
+            write(tmp_path / "file" / "below.npz" if write == circle.save else tmp_path / "file" / "below.png")
+    with pytest.raises(ParameterError, match="file type"):
+        circle.plot(tmp_path / "run.foo")
+    with pytest.raises(ParameterError, match=".csv"):
+        circle.save(tmp_path / "run.csv")
+
+
+def test_links_are_followed_when_writing(circle: cc.Run, tmp_path: Path) -> None:
+    (tmp_path / "there").mkdir()
+    (tmp_path / "run.csv").symlink_to(tmp_path / "there" / "real.csv")
+    circle.to_csv(tmp_path / "run.csv")
+    assert (tmp_path / "run.csv").is_symlink() and (tmp_path / "there" / "real.csv").stat().st_size > 1000

@@ -56,7 +56,7 @@ def test_what_comes_below_never_touches_what_is_above(system, seed):
         np.testing.assert_allclose(A @ after.u, A @ before.u, atol=100 * tol.LEAK * size)
 
 
-@given(oracles.SEEDS, st.floats(1e-8, 1e8))
+@given(oracles.SEEDS, oracles.magnitudes(1e-8, 1e8))
 def test_a_repeated_task_is_not_inverted_again(seed, unit):
     """A2 P1 is zero up to round-off; |u| must not grow, whatever the second task asks and in whatever unit."""
     rng = np.random.default_rng(seed)
@@ -88,7 +88,7 @@ def test_projected_to_zero_stays_bounded(seed, n):
     np.testing.assert_allclose(u.u, np.linalg.solve(A, b), atol=tol.ORACLE)
 
 
-@given(oracles.SEEDS, st.floats(1e-14, 1e-1), st.sampled_from([Truncated(), Truncated(1e-4), Damped(1e-2)]))
+@given(oracles.SEEDS, oracles.magnitudes(1e-14, 1e-1), st.sampled_from([Truncated(), Truncated(1e-4), Damped(1e-2)]))
 def test_near_an_algorithmic_singularity(seed, gap, policy):
     """The second task nearly repeats the first: bounded as the policy promises, the first task untouched."""
     rng = np.random.default_rng(seed)
@@ -111,7 +111,7 @@ def test_one_task_is_the_projected_gradient(seed, n):
     np.testing.assert_allclose(solve(p, "task-priority").u, solve(p, "projected-gradient").u, atol=tol.ORACLE)
 
 
-@given(oracles.SEEDS, st.floats(1e-6, 1e6))
+@given(oracles.SEEDS, oracles.magnitudes(1e-6, 1e6))
 def test_units_and_weights_of_the_tasks_do_not_matter(seed, unit):
     """Ranked tasks are not weighed: metres beside millimetres, heavy beside light, the same answer."""
     rng = np.random.default_rng(seed)

@@ -218,3 +218,69 @@ def test_an_absent_velocity_limit_is_none_not_zero(tmp_path: Path) -> None:
     text = arm().replace('velocity="3" effort="10"', "")
     robot = cc.load(write(tmp_path / "arm.urdf", text))
     assert np.isposinf(robot.limits.velocity_upper).all() and np.isneginf(robot.limits.torque_lower).all()
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        (arm().replace('axis xyz="0 1 0"', 'axis xyz="0 0 0"', 1), "axis 0 0 0"),
+        (arm().replace('axis xyz="0 1 0"', 'axis xyz="0 1"', 1), "expected 3"),
+        (arm().replace('mass value="1"', 'mass value="-1"', 1), "negative"),
+        (arm().replace('xyz="0 0 0.3"', 'xyz="0 0 1e308"', 1), "at most"),
+        (arm(joint_extra='<mimic joint="elbow"/>'), "mimics itself"),
+        (arm(kind="continuous", joint_extra='<mimic joint="shoulder"/>'), "continuous"),
+    ],
+)
+def test_absurd_robots_are_refused_in_one_line(tmp_path: Path, text: str, says: str) -> None:
+    with pytest.raises(UrdfError, match=says) as caught:
+        cc.load(write(tmp_path / "bad.urdf", text))
+    assert "\n" not in str(caught.value) and len(str(caught.value)) < 300
+
+
+def test_a_robot_without_a_name_and_shapes_without_geometry_load(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    text = arm(visual="<visual><geometry/></visual>").replace(' name="arm"', "")
+    assert cc.load(write(tmp_path / "arm.urdf", text)).name == "robot"
+    assert capfd.readouterr().err == ""
+
+
+@pytest.mark.parametrize("content", [b"", b"solid", b"\x00" * 90, b"<dae>"])
+@pytest.mark.parametrize("suffix", ["stl", "dae", "obj"])
+def test_broken_meshes_are_one_warning_and_the_rest_is_shown(tmp_path: Path, content: bytes, suffix: str) -> None:
+    write(tmp_path / "good.stl", CUBE)
+    (tmp_path / f"bad.{suffix}").write_bytes(content)
+    robot = cc.load(write(tmp_path / "arm.urdf", arm(visual=mesh("good.stl") + mesh(f"bad.{suffix}"))))
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        shapes = robot.visual_model.ngeoms
+    assert shapes == 1 and len([w for w in caught if issubclass(w.category, CartctlWarning)]) == 1
+
+
+def test_a_mesh_behind_a_circle_of_links_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "a.stl").symlink_to(tmp_path / "b.stl")
+    (tmp_path / "b.stl").symlink_to(tmp_path / "a.stl")
+    with pytest.raises(UnsafeUrdfError, match="outside"):
+        cc.load(write(tmp_path / "arm.urdf", arm(visual=mesh("a.stl"))))
+
+
+@pytest.mark.parametrize(
+    ("call", "error"),
+    [
+        (lambda: cc.load(None), ParameterError),
+        (lambda: cc.load("a\0b.urdf"), MissingUrdfError),
+        (lambda: cc.load("a" * 5000 + ".urdf"), MissingUrdfError),
+        (lambda: cc.load("planar3R", home=[1, 2, 3]), ParameterError),
+        (lambda: cc.load("planar3R", gravity=(0, 0, 1e308)), ParameterError),
+        (lambda: cc.Robot(3), ParameterError),
+        (lambda: cc.load("planar3R").random_configuration(3), ParameterError),
+        (lambda: cc.load("planar3R").integrate(np.zeros(3), np.full(3, np.nan)), NonFiniteError),
+        (lambda: cc.load("planar3R").difference(np.zeros(3), np.zeros(2)), ShapeError),
+        (lambda: cc.load("planar3R").coordinates(np.full(3, np.inf)), NonFiniteError),
+        (lambda: cc.simulate(3), ParameterError),
+    ],
+)
+def test_nonsense_is_refused_by_our_own_errors(call: object, error: type[CartctlError]) -> None:
+    with pytest.raises(error) as caught:
+        call()
+    assert "\n" not in str(caught.value)

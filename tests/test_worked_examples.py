@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from cartctl import DLS, Equation, Problem, Status, solve, spatial
+from cartctl import DLS, Equation, Problem, Status, analysis, solve, spatial
 from cartctl.algebra.nullspace import projector
 from tests import oracles
 
@@ -434,6 +434,44 @@ def _(given):
         for solver in ("pinv", "task-priority"):
             assert solve(problem, solver).status is Status.SINGULAR
     return {"identity_residual": worst}
+
+
+# ---------------------------------------------------------------- manipulability and forces
+
+
+@example("r1-2012-01-11-bonus")
+def _(given):
+    """The best posture of a planar 3R on the source's grid; its closed form against the singular values."""
+    l1, l2, l3 = given["L"]
+
+    def closed(q2, q3):
+        a, b = l1 * (l2 * np.sin(q2) + l3 * np.sin(q2 + q3)), l3 * (l1 * np.sin(q2 + q3) + l2 * np.sin(q3))
+        return np.sqrt(a**2 + b**2 + (l2 * l3 * np.sin(q3)) ** 2)
+
+    def manipulability(q2, q3):
+        return analysis.manipulability(oracles.planar_jacobian(given["L"], [0.7, q2, q3]))
+
+    angles = np.arange(0.0, math.pi, given["grid"])
+    grid = closed(angles[:, None], angles[None])
+    best = [angles[i] for i in np.unravel_index(np.argmax(grid), grid.shape)]
+    some = np.random.default_rng(12).uniform(-math.pi, math.pi, (50, 2))
+    return {
+        "H_max": manipulability(*best),
+        "q2_q3": best,
+        "closed_form_residual": max(abs(manipulability(*q) - closed(*q)) for q in some),
+        "H_at_printed": manipulability(*ITEMS["r1-2012-01-11-bonus"]["expected"]["q2_q3"]),
+    }
+
+
+@example("r2-2014-10-27-ex2")
+def _(given):
+    """PRR: the largest force in the direction that joint 3 alone bounds, and the torques that balance it."""
+    length, limits = np.array(given["l"]), np.array(given["limits"], dtype=float)
+    J = np.hstack([[[1.0], [0.0]], oracles.planar_jacobian(length, real(given["q"][1:]))])
+    force = given["F_norm"] * ray(real(given["F_dir"]))
+    bearable = analysis.force_ellipsoid(J[:, 2:], metric=limits[2:] ** 2)
+    assert bearable.along(force) == pytest.approx(given["F_norm"])
+    return {"tau": -J.T @ force, "rank": analysis.rank(J)}
 
 
 # ---------------------------------------------------------------- Euler angles

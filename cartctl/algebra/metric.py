@@ -38,6 +38,13 @@ def as_metric(value: Any, n: int, name: str = "metric") -> FloatArray:
     if asymmetry > _SYMMETRY * float(np.abs(full).max()):
         raise MetricError(f"{name} differs from its transpose by {asymmetry:.3g}; expected a symmetric matrix")
     _factor(full, name)
+    # round-off lifts the zero eigenvalue of a semidefinite matrix above zero half of the time; units shall not matter
+    root = np.sqrt(np.diag(full))
+    eigenvalues = np.linalg.eigvalsh(full / root / root[:, None])
+    if eigenvalues[0] <= 8.0 * n * _EPS * eigenvalues[-1]:
+        raise MetricError(
+            f"{name} has the relative eigenvalue {eigenvalues[0]:.3g}; expected a positive definite matrix"
+        )
     return full
 
 

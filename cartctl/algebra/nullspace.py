@@ -24,6 +24,34 @@ def null_part(decomposition: SVD, floor: float, u0: FloatArray) -> FloatArray:
     return part - R.T @ (R @ part)  # type: ignore[no-any-return]
 
 
+class NullSpace:
+    """The common null space of the tasks met so far, narrowed task by task; all of R^n to begin with."""
+
+    __slots__ = ("_basis", "dimension")
+
+    def __init__(self, n: int) -> None:
+        self.dimension = n
+        self._basis: FloatArray | None = None  # (n, dimension), None for the identity
+
+    def restrict(self, A: FloatArray) -> FloatArray:
+        """``A Z``, (m, dimension): what a task can still do."""
+        return A if self._basis is None else np.asfortranarray(A @ self._basis)
+
+    def lift(self, y: FloatArray) -> FloatArray:
+        """``Z y``, (n,)."""
+        return y if self._basis is None else self._basis @ y
+
+    def project(self, u: FloatArray) -> FloatArray:
+        """``Z Z^T u``, (n,)."""
+        return u if self._basis is None else self._basis @ (self._basis.T @ u)
+
+    def narrow(self, restricted: SVD, floor: float) -> None:
+        """Take away the directions of a task, given the SVD of its restriction."""
+        rest = restricted.Vt[numerical_rank(restricted.s, floor) :].T
+        self._basis = rest if self._basis is None else self._basis @ rest
+        self.dimension = rest.shape[1]
+
+
 def basis(A: FloatArray) -> FloatArray:
     """An orthonormal basis (n, n - rank) of the null space of A (m, n)."""
     decomposition = svd(np.asfortranarray(A, dtype=np.float64))

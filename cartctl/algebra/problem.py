@@ -14,6 +14,7 @@ import numpy as np
 
 from cartctl import checks
 from cartctl.algebra.metric import as_metric
+from cartctl.algebra.svd import scale
 from cartctl.checks import FloatArray
 from cartctl.errors import ProblemError, ShapeError
 
@@ -27,7 +28,9 @@ class Equation:
     A: (m, n). b: (m,), the command, slowed by s where a method scales. drift: (m,), never slowed; zeros.
     fit: ``"scale"`` (exact, with s as large as possible in [0, 1]) or ``"least_squares"`` (s = 1, least error);
     a method that does not scale has s = 1 and meets both as well as it can. weight: >= 0, counts where a method
-    weighs equations against each other instead of ranking them. name: shown in reports.
+    weighs equations against each other instead of ranking them. name: shown in reports. size: the norm that A has by
+    nature, where A is a few rows of something larger: cutoffs are relative to the larger of it and ||A||, so that rows
+    which are zero up to round-off are never inverted.
 
     Raises ShapeError, NonFiniteError, ParameterError.
     """
@@ -38,6 +41,7 @@ class Equation:
     fit: str = "scale"
     weight: float = 1.0
     name: str = ""
+    size: float = 0.0
 
     def __post_init__(self) -> None:
         label = f"equation {self.name!r}: " if self.name else "equation: "
@@ -49,10 +53,11 @@ class Equation:
             put(self, "drift", checks.vector(label + "drift", self.drift, rows))
         checks.choice(label + "fit", self.fit, FITS)
         put(self, "weight", checks.number(label + "weight", self.weight, low=0.0))
+        put(self, "size", checks.number(label + "size", self.size, low=0.0))
 
     @classmethod
     def trusted(
-        cls, A: FloatArray, b: FloatArray, drift: FloatArray | None, fit: str, weight: float, name: str
+        cls, A: FloatArray, b: FloatArray, drift: FloatArray | None, fit: str, weight: float, name: str, size: float
     ) -> Equation:
         """The same without checks or copies, for levels whose arrays are known to be good."""
         self = _new(cls)
@@ -62,7 +67,16 @@ class Equation:
         _set_fit(self, fit)
         _set_weight(self, weight)
         _set_name(self, name)
+        _set_size(self, size)
         return self
+
+    @property
+    def ratio(self) -> float:
+        """How much larger than ||A|| the equation is by nature; at least 1."""
+        if self.size == 0.0:
+            return 1.0
+        norm = scale(self.A)
+        return max(1.0, self.size / norm) if norm > 0.0 else 1.0
 
     @property
     def rhs(self) -> FloatArray:
@@ -146,8 +160,8 @@ class Problem:
 
 # The slots' own setters pass by the frozen __setattr__, in half the time object.__setattr__ takes.
 _new = object.__new__
-_set_matrix, _set_b, _set_drift, _set_fit, _set_weight, _set_name = (
-    vars(Equation)[name].__set__ for name in ("A", "b", "drift", "fit", "weight", "name")
+_set_matrix, _set_b, _set_drift, _set_fit, _set_weight, _set_name, _set_size = (
+    vars(Equation)[name].__set__ for name in ("A", "b", "drift", "fit", "weight", "name", "size")
 )
 _set_equations, _set_lower, _set_upper, _set_constraints, _set_metric, _set_reference = (
     vars(Problem)[name].__set__ for name in ("equations", "lower", "upper", "constraints", "metric", "reference")

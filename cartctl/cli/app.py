@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 
 from cartctl import __version__
+from cartctl.cli.compare import compare
 from cartctl.cli.doctor import doctor
 from cartctl.cli.info import info
 from cartctl.cli.track import track
@@ -42,5 +43,9 @@ app.command(
     epilog="Example:  cartctl track panda --path circle --radius 0.1 --open\n\n"
     "Example:  cartctl track my_robot.urdf --frame gripper --axes position --solver dls"
 )(track)
+app.command(
+    epilog="Example:  cartctl compare panda\n\n"
+    "Example:  cartctl compare panda --solvers pinv,projected-gradient,extended-jacobian --laps 5 --open"
+)(compare)
 app.command(epilog="Example:  cartctl info panda")(info)
 app.command(epilog="Example:  cartctl doctor")(doctor)

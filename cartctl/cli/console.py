@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import math
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import wraps
-from typing import Annotated, Any, ParamSpec
+from typing import Annotated, Any, ParamSpec, Protocol
 
 import typer
 from rich import box
@@ -17,6 +16,7 @@ from rich.table import Table
 from rich.text import Text
 
 from cartctl.errors import CartctlError, CartctlWarning
+from cartctl.report.numbers import number as number
 
 P = ParamSpec("P")
 
@@ -107,15 +107,6 @@ def columns(first: str, *rest: str) -> Table:
     return table
 
 
-def number(value: float | None) -> str:
-    """Three digits, without an exponent where that stays short."""
-    if value is None or not math.isfinite(value):
-        return "-"
-    if value and not 1e-3 <= abs(value) < 1e5:
-        return f"{value:.1e}"
-    return f"{value:.0f}" if abs(value) >= 999.5 else f"{value:.3g}"
-
-
 @contextmanager
 def busy(doing: str) -> Iterator[None]:
     """A spinner while something takes its time; nothing where nobody watches."""
@@ -127,11 +118,23 @@ def busy(doing: str) -> Iterator[None]:
         yield
 
 
+class Tell(Protocol):
+    """What a loop tells of itself now and then: steps made, steps to make, and what it is at, if that has changed."""
+
+    def __call__(self, k: int, n: int, doing: str | None = None, /) -> None:
+        """Show it."""
+        ...
+
+
 @contextmanager
-def progress(doing: str) -> Iterator[Callable[[int, int], None]]:
+def progress(doing: str) -> Iterator[Tell]:
     """A bar with the time left, as a function of steps made and steps to make; it leaves no trace."""
     console = err()
     parts = (TextColumn("{task.description}", markup=False), BarColumn(), TaskProgressColumn(), TimeRemainingColumn())
-    with Progress(*parts, console=console, transient=True, disable=not console.is_terminal) as bar:
+    with Progress(*parts, console=console, transient=True, auto_refresh=False, disable=not console.is_terminal) as bar:
         task = bar.add_task(doing, total=None)
-        yield lambda k, n: bar.update(task, completed=k, total=n)
+
+        def tell(k: int, n: int, doing: str | None = None, /) -> None:
+            bar.update(task, completed=k, total=n, description=doing, refresh=True)
+
+        yield tell

@@ -10,6 +10,9 @@ from pathlib import Path
 from cartctl.cli.console import busy, say
 from cartctl.errors import ParameterError
 from cartctl.motion.run import Run
+from cartctl.report import Comparison
+
+_PICTURES = (".html", ".png")
 
 
 class Files:
@@ -21,11 +24,15 @@ class Files:
         except OSError as error:
             reason = error.strerror or error
             raise ParameterError(f"--out is {str(folder)!r}: {reason}; expected a folder that can be written") from None
-        self._stem = folder / "-".join(_safe(part) for part in parts)
+        self._folder, self._parts = folder, [_safe(part) for part in parts]
 
     def at(self, suffix: str) -> Path:
         """The file with this suffix."""
-        return self._stem.with_name(self._stem.name + suffix)
+        return self._folder / ("-".join(self._parts) + suffix)
+
+    def sibling(self, last: str, suffix: str) -> Path:
+        """The same with another last part."""
+        return self._folder / ("-".join([*self._parts[:-1], last]) + suffix)
 
     def write(self, run: Run, *, csv: bool, parquet: bool) -> list[tuple[str, str]]:
         """Write ``run`` and return (path, what it is); pictures need more than one sample."""
@@ -37,8 +44,20 @@ class Files:
             writers.append((".csv", run.to_csv, "every step as text"))
         if parquet:
             writers.append((".parquet", run.to_parquet, "every step as a table"))
-        # The data first: they cannot be made again.
-        for suffix, write, _ in sorted(writers, key=lambda writer: writer[0] != ".npz"):
+        return self._written(writers)
+
+    def write_comparison(self, comparison: Comparison) -> list[tuple[str, str]]:
+        """Write ``comparison`` and return (path, what it is)."""
+        return self._written([
+            (".html", comparison.html, "the moving robots, for your browser"),
+            (".png", comparison.plot, "the figures over time"),
+            (".md", comparison.to_markdown, "the table, to be read"),
+            (".csv", comparison.to_csv, "the table, to be worked on"),
+        ])  # fmt: skip
+
+    def _written(self, writers: list[tuple[str, Callable[[Path], object], str]]) -> list[tuple[str, str]]:
+        # Data first: they cannot be made again. Then what takes no time.
+        for suffix, write, _ in sorted(writers, key=lambda writer: (writer[0] != ".npz", writer[0] in _PICTURES)):
             with busy(f"writing {self.at(suffix)}"):
                 write(self.at(suffix))
         return [(str(self.at(suffix)), what) for suffix, _, what in writers]

@@ -8,6 +8,7 @@ import typer
 
 from cartctl.cli import choices, options
 from cartctl.cli.console import Debug, busy, columns, facts, number, out, verb
+from cartctl.errors import ParameterError
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -22,38 +23,51 @@ _UNITS = "In rad, rad/s, rad/s^2, N m; prismatic joints in m, m/s, m/s^2, N; -: 
 def info(
     robot: Annotated[str | None, options.ROBOT] = None,
     frames: Annotated[bool, typer.Option("--frames", help="List all frames, however many.")] = False,
+    home: options.Home = None,
+    frame: options.Frame = None,
+    axes: options.Axes = None,
     package_dir: options.PackageDirs = None,
     root_joint: options.RootJoint = None,
     debug: Debug = False,
 ) -> None:
-    """Show a robot's joints, limits and frames; without ROBOT, list the names of robots and solvers."""
+    """Show a robot's joints, limits and frames; without ROBOT, list the names of robots and solvers.
+
+    Singular values, ranks and ellipsoids are those of the tool, or of --frame, at home, or where --home puts it.
+    """
     import cartctl as cc
 
     if robot is None:
+        _refuse_stray({"--home": home, "--frame": frame, "--axes": axes})
         for title, names in (("Robots", cc.robots()), ("Solvers", cc.solvers())):
             out().print(title, style="underline")
             out().print(facts(list(names.items())), "")
         out().print("More about a robot: cartctl info NAME. Any .urdf file will do as well.", style="dim")
         return
     with busy(f"loading {robot}"):
-        machine = cc.load(robot, package_dirs=package_dir or (), root_joint=root_joint)
-    out().print(_head(machine), "", _joints(machine))
+        posture = choices.posture(home or ())
+        machine = cc.load(robot, package_dirs=package_dir or (), root_joint=root_joint, home=posture)
+        head = _head(machine, frame, axes)
+    out().print(head, "", _joints(machine))
     out().print(f"{_UNITS}\n", style="dim")
     out().print(facts([("frames", _frames(machine, frames)), *_sources(machine)]))
 
 
-def _head(robot: Robot) -> Table:
-    from cartctl.cli.hand import Hand
+def _refuse_stray(given: dict[str, object]) -> None:
+    """Options about a robot need one."""
+    for name, value in given.items():
+        if value is not None and value != []:
+            raise ParameterError(f"{name} is given without a robot; expected `cartctl info ROBOT {name} ...`")
 
-    values = Hand(robot, robot.tool).singular_values()
-    rank = int((values > 1e-6 * max(float(values[0]), 1e-12)).sum())
+
+def _head(robot: Robot, frame: str | None, axes: str | None) -> Table:
+    from cartctl.cli.abilities import abilities
+
     given = robot.spec or {}
     return facts([
         ("robot", " - ".join(filter(None, (robot.name, choices.robots().get(robot.name, ""))))),
         ("size", f"{robot.nv} degrees of freedom; q has {robot.nq} numbers; base {given.get('root_joint', 'fixed')}"),
         ("tool", robot.tool),
-        ("its Jacobian", f"rank {rank} at home"),
-        ("singular values", "  ".join(number(s) for s in values)),
+        *abilities(robot, frame, axes),
         ("gravity", f"{'  '.join(f'{g:g}' for g in robot.gravity)} m/s^2"),
     ])  # fmt: skip
 

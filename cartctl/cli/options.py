@@ -82,6 +82,13 @@ SolverName = Annotated[
         autocompletion=completion(solver_names),
     ),
 ]
+SolverNames = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--solvers", "--solver", metavar="A,B,C", rich_help_panel=_METHOD, autocompletion=completion(solver_names),
+        help="Names from `cartctl info`, with commas or repeated, the first drawn solid; by default all.",
+    ),
+]  # fmt: skip
 LevelName = Annotated[
     str, typer.Option("--level", metavar="NAME", rich_help_panel=_METHOD, help="What is commanded: velocity.")
 ]

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from cartctl.errors import LevelNotFound, ParameterError
-from cartctl.levels.base import Command, Level
+from cartctl.levels.base import Command, Level, Secondary
 from cartctl.levels.velocity import VelocityLevel
 
 _REGISTRY: dict[str, type[Level]] = {"velocity": VelocityLevel}
 
-__all__ = ["Command", "Level", "VelocityLevel", "get_level", "levels"]
+__all__ = ["Command", "Level", "Secondary", "VelocityLevel", "get_level", "levels"]
 
 
 def levels() -> list[str]:

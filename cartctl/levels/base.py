@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
+
+import numpy as np
 
 from cartctl.algebra.problem import Problem
 from cartctl.algebra.solution import Solution
 from cartctl.checks import FloatArray, is_finite
-from cartctl.errors import NonFiniteError
+from cartctl.errors import NonFiniteError, ShapeError
 from cartctl.model.state import State
 from cartctl.objectives.base import Objective
 from cartctl.tasks.base import Reference, Task
@@ -38,6 +40,18 @@ class Command:
         self.torque = torque
 
 
+class Secondary(NamedTuple):
+    """What the redundancy is spent on.
+
+    share: of the objective, in [0, 1]. extend: K in 1/s of the rows that keep the objective extremal, None where the
+    solver spends it through u0.
+    """
+
+    objective: Objective | None = None
+    share: float = 1.0
+    extend: float | None = None
+
+
 class Level(ABC):
     """Velocity, acceleration or torque: what u is, and what A and b are made of."""
 
@@ -51,18 +65,23 @@ class Level(ABC):
         tasks: Sequence[Task],
         t: float,
         anchors: Sequence[Any],
-        objective: Objective | None,
-        rise: float,
+        secondary: Secondary,
         metric: FloatArray | None,
     ) -> tuple[Problem, list[Reference]]:
-        """The problem of this instant, and the references it was made from; raises NonFiniteError.
-
-        rise: the share of the objective that counts, in [0, 1].
-        """
+        """The problem of this instant, and the references it was made from; raises NonFiniteError."""
 
     @abstractmethod
     def command(self, solution: Solution, references: Sequence[Reference]) -> Command:
         """The command that the answer means."""
+
+
+def direction(objective: Objective, state: State) -> FloatArray:
+    """``u0`` (nv,) of an objective; raises ShapeError, NonFiniteError naming it."""
+    u0 = np.asarray(objective.direction(state), dtype=np.float64)
+    name = f"the gradient of {type(objective).__name__}"
+    if u0.shape != (state.robot.nv,):
+        raise ShapeError(f"{name} has shape {u0.shape}; expected ({state.robot.nv},)")
+    return require_finite(u0, name)
 
 
 def require_finite(array: FloatArray, what: str) -> FloatArray:

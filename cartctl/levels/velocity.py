@@ -8,7 +8,8 @@ from typing import Any, ClassVar
 from cartctl.algebra.problem import Equation, Problem
 from cartctl.algebra.solution import Solution
 from cartctl.checks import FloatArray
-from cartctl.levels.base import Command, Level, require_finite
+from cartctl.levels.base import Command, Level, Secondary, direction, require_finite
+from cartctl.levels.extremal import extremal_rows
 from cartctl.model.state import State
 from cartctl.objectives.base import Objective
 from cartctl.tasks.base import Reference, Task
@@ -19,14 +20,16 @@ class VelocityLevel(Level):
 
     name: ClassVar[str] = "velocity"
 
+    def __init__(self) -> None:
+        self._scratch: State | None = None
+
     def problem(
         self,
         state: State,
         tasks: Sequence[Task],
         t: float,
         anchors: Sequence[Any],
-        objective: Objective | None,
-        rise: float,
+        secondary: Secondary,
         metric: FloatArray | None,
     ) -> tuple[Problem, list[Reference]]:
         """The problem of this instant, and the references it was made from; raises NonFiniteError."""
@@ -38,12 +41,25 @@ class VelocityLevel(Level):
             if reference.rate is not None:
                 b = b + reference.rate
             require_finite(b, f"the command of task {task.name!r}")
-            equations.append(Equation.trusted(task.jacobian(state), b, None, task.fit, task.weight, task.name))
+            J, size = task.jacobian(state), task.size(state)
+            equations.append(Equation.trusted(J, b, None, task.fit, task.weight, task.name, size))
             references.append(reference)
-        u0 = None
-        if objective is not None:
-            u0 = rise * require_finite(objective.direction(state), "the objective's gradient")
+        objective = secondary.objective
+        if objective is None:
+            return Problem.trusted(tuple(equations), metric, None), references
+        if secondary.extend is not None:
+            equations.append(self._extremal(state, tasks, objective, secondary.extend))
+            return Problem.trusted(tuple(equations), metric, None), references
+        u0 = secondary.share * direction(objective, state)
         return Problem.trusted(tuple(equations), metric, u0), references
+
+    def _extremal(self, state: State, tasks: Sequence[Task], objective: Objective, gain: float) -> Equation:
+        """``A_e v = -K Z^T grad H``."""
+        if self._scratch is None or self._scratch.robot is not state.robot:
+            self._scratch = State(state.robot)
+        rows = extremal_rows(state, tasks, objective, self._scratch)
+        require_finite(rows.A, "the objective's Hessian")
+        return Equation.trusted(rows.A, -gain * rows.slope, None, "scale", 1.0, "extremal set", 0.0)
 
     def command(self, solution: Solution, references: Sequence[Reference]) -> Command:
         """U is the velocity."""

@@ -14,8 +14,9 @@ import numpy as np
 import pinocchio as pin
 
 from cartctl import checks
-from cartctl.errors import CartctlWarning, JointNotFound, RobotNotFound, UrdfError
+from cartctl.errors import CartctlWarning, JointNotFound, ParameterError, RobotNotFound, UrdfError
 from cartctl.model import urdf as urdf_file
+from cartctl.model.console import console_of_c
 from cartctl.model.library import LibraryEntry, find, robots
 from cartctl.model.meshes import MeshFolders
 from cartctl.model.planar import PlanarLimits, planar_urdf
@@ -48,6 +49,10 @@ def load(
     Raises RobotNotFound, UrdfError, JointNotFound, FrameNotFound, ParameterError, ShapeError, NonFiniteError. Missing
     meshes are one CartctlWarning.
     """
+    if not isinstance(source, (str, os.PathLike)):
+        raise ParameterError(f"source is a {type(source).__name__}; expected a name from cc.robots() or a path")
+    if home is not None and not isinstance(home, Mapping):
+        raise ParameterError(f"home is a {type(home).__name__}; expected a mapping of joint names to rad or m")
     checks.choice("root_joint", root_joint or "fixed", tuple(_ROOTS))
     entry = _entry(source)
     label = entry.name if entry else str(source)
@@ -60,7 +65,7 @@ def load(
     active = _active(parsed, active_joints, () if fingers or entry is None else entry.locked)
     text = parsed.text(mimicking=_mimicking(parsed, active))
     model = _lock(_build(text, root, label), active, posture, parsed)
-    model.gravity = pin.Motion(np.array(checks.vector("gravity", gravity, 3)), np.zeros(3))
+    model.gravity = _gravity(gravity)
     model.name = entry.name if entry else parsed.name
     if parsed.missing:
         warnings.warn(_missing(label, parsed.missing), CartctlWarning, stacklevel=2)
@@ -90,11 +95,18 @@ def _entry(source: str | os.PathLike[str]) -> LibraryEntry | None:
     looks_like_path = (
         not isinstance(source, str) or text.lower().endswith((".urdf", ".xml", ".xacro")) or os.sep in text
     )
-    if looks_like_path or Path(text).is_file():
+    if looks_like_path or _is_file(text):
         return None
     if not text.strip():
         raise RobotNotFound(text, robots(), "or a path to a .urdf file")
     return find(text)
+
+
+def _is_file(text: str) -> bool:
+    try:
+        return Path(text).is_file()
+    except (OSError, ValueError):  # too long for a path, or a NUL
+        return False
 
 
 def _parse(source: Any, entry: LibraryEntry | None, package_dirs: Sequence[Any]) -> Urdf:
@@ -134,17 +146,24 @@ def _mimicking(parsed: Urdf, active: set[str]) -> set[str]:
         raise UrdfError(
             f"joint {chained[0]!r} mimics a joint that itself mimics another; expected an independent master"
         )
+    for name in followers:
+        if "continuous" in (parsed.joints[name], parsed.joints[parsed.mimics[name].master]):
+            raise UrdfError(
+                f"joint {name!r} mimics a continuous joint, or is one; leave its master out of active_joints"
+            )
     return followers
 
 
 def _build(text: str, root: str, label: str) -> pin.Model:
     joint = _ROOTS[root]
+    said: list[str] = []
     try:
-        if joint is None:
-            return pin.buildModelFromXML(text, True)
-        return pin.buildModelFromXML(text, joint(), True)
+        with console_of_c(said):
+            if joint is None:
+                return pin.buildModelFromXML(text, True)
+            return pin.buildModelFromXML(text, joint(), True)
     except (ValueError, RuntimeError) as error:
-        why = " ".join(str(error).split()).rstrip(".")
+        why = " ".join((said[0] if said else str(error)).split()).removeprefix("Error:").strip().rstrip(".")[:200]
         advice = "; lock its mimic joints: leave them out of active_joints" if "mimic" in why.lower() else ""
         raise UrdfError(f"{label} cannot be built: {why}{advice}") from None
 
@@ -160,13 +179,15 @@ def _lock(model: pin.Model, active: set[str], posture: Mapping[str, float], pars
     return pin.buildReducedModel(model, [model.getJointId(n) for n in frozen], whole.configuration(values, whole.home))
 
 
-def _locked_at(name: str, whole: Robot, posture: Mapping[str, float], parsed: Urdf) -> float:
+def _locked_at(name: str, whole: Robot, posture: Mapping[str, float], parsed: Urdf, depth: int = 0) -> float:
     """Where a locked joint stands: as asked, following its locked master, or at home."""
     if name in posture:
         return posture[name]
     mimic = parsed.mimics.get(name)
     if mimic is not None:
-        return mimic.multiplier * _locked_at(mimic.master, whole, posture, parsed) + mimic.offset
+        if depth > len(parsed.mimics):
+            raise UrdfError(f"joint {name!r} mimics itself in a circle; expected an independent master")
+        return mimic.multiplier * _locked_at(mimic.master, whole, posture, parsed, depth + 1) + mimic.offset
     return float(whole.coordinates(whole.home)[whole.dof(name)])
 
 
@@ -181,30 +202,33 @@ def planar(
     lengths: Sequence[float],
     masses: Sequence[float] | None = None,
     *,
+    joints: str | None = None,
+    name: str | None = None,
+    limits: PlanarLimits | None = None,
     gravity: Sequence[float] = EARTH,
-    **options: Any,
 ) -> Robot:
     """A planar arm with links of the given lengths (m) and masses (kg), in the x-y plane, tip frame ``tool``.
 
-    options: ``joints``, ``name``, ``limits`` of :func:`cartctl.model.planar.planar_urdf`. Raises as that and
-    :func:`load`.
+    joints, name, limits as in :func:`cartctl.model.planar.planar_urdf`. Raises as that and :func:`load`.
     """
-    text = planar_urdf(lengths, masses, **options)
+    text = planar_urdf(lengths, masses, joints=joints, name=name, limits=limits)
     parsed = urdf_file.parse(text, "planar arm", MeshFolders(None, ()))
     model = _build(text, "fixed", "planar arm")
-    model.gravity = pin.Motion(np.array(checks.vector("gravity", gravity, 3)), np.zeros(3))
+    model.gravity = _gravity(gravity)
     model.name = parsed.name
-    spec: dict[str, Any] = {
+    spec = {
         "lengths": [float(x) for x in lengths],
         "masses": None if masses is None else [float(x) for x in masses],
-    }
-    limits = options.get("limits")
-    spec |= {
-        "gravity": [float(x) for x in gravity],
-        **options,
+        "joints": joints,
+        "name": name,
         "limits": None if limits is None else asdict(limits),
+        "gravity": [float(x) for x in gravity],
     }
     return Robot(model, tool="tool", geometry=Geometry(text), spec=spec)
+
+
+def _gravity(gravity: Sequence[float]) -> pin.Motion:
+    return pin.Motion(np.array(checks.vector("gravity", gravity, 3, largest=1e6)), np.zeros(3))
 
 
 def reload(spec: Mapping[str, Any]) -> Robot:

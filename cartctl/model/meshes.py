@@ -55,15 +55,15 @@ class MeshFolders:
             )
         roots = self._roots()
         if Path(rest).is_absolute():
-            return [(Path(rest).resolve(), root) for root in roots]
+            return [(_resolved(Path(rest)), root) for root in roots]
         bases = ([] if self.urdf_dir is None else [self.urdf_dir]) + list(self.package_dirs)
-        return [((base / rest).resolve(), root) for base in bases for root in roots]
+        return [(_resolved(base / rest), root) for base in bases for root in roots]
 
     def _in_package(self, rest: str) -> list[tuple[Path, Path]]:
         package, _, inner = rest.partition("/")
-        found = [((folder / rest).resolve(), folder) for folder in self.package_dirs]
+        found = [(_resolved(folder / rest), folder) for folder in self.package_dirs]
         named = [folder for folder in (*self.package_dirs, *self._ancestors()) if folder.name == package]
-        return found + [((folder / inner).resolve(), folder) for folder in named]
+        return found + [(_resolved(folder / inner), folder) for folder in named]
 
     def _ancestors(self) -> tuple[Path, ...]:
         return () if self.urdf_dir is None else (self.urdf_dir, *self.urdf_dir.parents)
@@ -72,3 +72,11 @@ class MeshFolders:
         """The URDF's folder or the ROS package around it, then the caller's."""
         own = next((folder for folder in self._ancestors() if (folder / "package.xml").is_file()), self.urdf_dir)
         return ([] if own is None else [own]) + list(self.package_dirs)
+
+
+def _resolved(path: Path) -> Path:
+    """``path`` without links; a link that leads in a circle leads outside."""
+    try:
+        return path.resolve()
+    except (OSError, RuntimeError):
+        return Path(path.anchor or "/")

@@ -10,7 +10,7 @@ import pinocchio as pin
 
 from cartctl import checks
 from cartctl.checks import FloatArray
-from cartctl.errors import ConfigurationError, FrameNotFound, JointNotFound
+from cartctl.errors import ConfigurationError, FrameNotFound, JointNotFound, ParameterError
 from cartctl.model.limits import Limits
 from cartctl.model.state import State
 from cartctl.model.visuals import Geometry
@@ -42,6 +42,8 @@ class Robot:
         geometry: Geometry | None = None,
         spec: Mapping[str, Any] | None = None,
     ) -> None:
+        if not isinstance(model, pin.Model):
+            raise ParameterError(f"model is a {type(model).__name__}; expected a pinocchio.Model, or use cc.load(...)")
         self.model = model.copy()
         self.name = name or model.name
         self.spec = None if spec is None else dict(spec)
@@ -63,6 +65,7 @@ class Robot:
         self.home = _read_only(self._home(home or {}))
         self.tool = self._tool(tool)
         self._geometry = geometry
+        self._rest = _read_only(np.zeros(self.nv))
 
     @property
     def gravity(self) -> FloatArray:
@@ -103,12 +106,15 @@ class Robot:
         Raises ShapeError, NonFiniteError, ConfigurationError.
         """
         state = State(self)
-        state.set(self.check_configuration(q), np.zeros(self.nv) if v is None else checks.vector("v", v, self.nv))
+        state.set(
+            self.check_configuration(q),
+            self._rest if v is None else checks.vector("v", v, self.nv, largest=checks.LARGEST),
+        )
         return state
 
     def check_configuration(self, q: Any, name: str = "q") -> FloatArray:
         """``q`` as a read-only (nq,) copy, checked; raises ShapeError, NonFiniteError, ConfigurationError."""
-        checked = checks.vector(name, q, self.nq)
+        checked = checks.vector(name, q, self.nq, largest=checks.LARGEST)
         if not self.is_on_manifold(checked):
             raise ConfigurationError(
                 f"{name} holds a quaternion or a (cos, sin) pair without unit norm; "
@@ -121,20 +127,20 @@ class Robot:
         return self._plain or bool(pin.isNormalized(self.model, q, _UNIT))
 
     def integrate(self, q: FloatArray, displacement: FloatArray) -> FloatArray:
-        """``q (+) displacement``, (nq,)."""
-        return pin.integrate(self.model, q, displacement)  # type: ignore[no-any-return]
+        """``q (+) displacement``, (nq,); raises ShapeError, NonFiniteError."""
+        return pin.integrate(self.model, _sound("q", q, self.nq), _sound("displacement", displacement, self.nv))  # type: ignore[no-any-return]
 
     def difference(self, q0: FloatArray, q1: FloatArray) -> FloatArray:
         """``q1 (-) q0``, (nv,): the displacement that leads from q0 to q1."""
-        return pin.difference(self.model, q0, q1)  # type: ignore[no-any-return]
+        return pin.difference(self.model, _sound("q0", q0, self.nq), _sound("q1", q1, self.nq))  # type: ignore[no-any-return]
 
     def coordinates(self, q: FloatArray) -> FloatArray:
         """(nv,) joint coordinates of q, comparable with ``limits.position_*``; continuous joints in (-pi, pi]."""
-        return pin.difference(self.model, self.neutral, q)  # type: ignore[no-any-return]
+        return pin.difference(self.model, self.neutral, _sound("q", q, self.nq))  # type: ignore[no-any-return]
 
     def configuration(self, values: Mapping[str, float], base: FloatArray | None = None) -> FloatArray:
         """(nq,) ``base`` (neutral if None) with the joints named in ``values`` at rad or m; raises JointNotFound."""
-        q = np.array(self.neutral if base is None else base)
+        q = np.array(self.neutral if base is None else _sound("base", base, self.nq))
         for name, value in values.items():
             self.dof(name)
             joint = self._joints[name]
@@ -144,6 +150,8 @@ class Robot:
 
     def random_configuration(self, rng: np.random.Generator) -> FloatArray:
         """(nq,) uniform inside the position limits; unlimited joints in +-pi or +-1 m, bases in +-1 m, any rotation."""
+        if not isinstance(rng, np.random.Generator):
+            raise ParameterError(f"rng is a {type(rng).__name__}; expected numpy.random.default_rng(seed)")
         q = pin.randomConfiguration(self.model, np.full(self.nq, -1.0), np.full(self.nq, 1.0))
         low, high = self.limits.position_lower, self.limits.position_upper
         values = {}
@@ -201,3 +209,10 @@ def _read_only(array: Any) -> FloatArray:
     copy = np.array(array, dtype=np.float64)
     copy.flags.writeable = False
     return copy
+
+
+def _sound(name: str, value: Any, size: int) -> FloatArray:
+    """``value`` itself if it is a sound (size,) array, else a checked copy; raises ShapeError, NonFiniteError."""
+    if type(value) is np.ndarray and value.dtype == np.float64 and value.shape == (size,) and checks.is_moderate(value):
+        return value
+    return checks.vector(name, value, size, largest=checks.LARGEST)

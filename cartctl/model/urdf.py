@@ -14,11 +14,16 @@ from xml.etree.ElementTree import Element, ParseError, tostring
 from defusedxml import DefusedXmlException
 from defusedxml import ElementTree as SafeTree
 
-from cartctl.errors import MalformedUrdfError, MissingUrdfError, NoJointsError, UnsafeUrdfError, UrdfError
+from cartctl.errors import CartctlError, MalformedUrdfError, MissingUrdfError, NoJointsError, UnsafeUrdfError, UrdfError
 from cartctl.model.meshes import MeshFolders
 
 MOVABLE = ("revolute", "continuous", "prismatic")
 _UNSUPPORTED = ("planar", "floating", "spherical")
+_LENGTHS = {"xyz": 3, "rpy": 3, "size": 3}
+_LARGEST = 1e6  # of a length, mass or inertia; beyond it nothing is a robot
+_MOST_JOINTS = 1000
+_NOISE = 1e-12  # CAD exports write -5e-20 for a zero
+_NEVER_NEGATIVE = {("mass", "value"), ("inertia", "ixx"), ("inertia", "iyy"), ("inertia", "izz"), ("sphere", "radius")}
 _NUMERIC = {
     "xyz", "rpy", "size", "radius", "length", "scale", "value", "ixx", "ixy", "ixz", "iyy", "iyz", "izz", "lower",
     "upper", "effort", "velocity", "multiplier", "offset", "damping", "friction",
@@ -66,16 +71,21 @@ class Urdf:
 
 def read(path: Path) -> bytes:
     """The bytes of a URDF file; raises UrdfError where there is none."""
-    if path.is_dir():
-        raise MissingUrdfError(f"{path} is a folder; expected a .urdf file")
     try:
+        if path.is_dir():
+            raise MissingUrdfError(f"{path} is a folder; expected a .urdf file")
         return path.read_bytes()
     except FileNotFoundError:
         raise MissingUrdfError(
             f"{path}: no such file; expected the path of a .urdf file or a name from cc.robots()"
         ) from None
-    except OSError as error:
-        raise UrdfError(f"{path} cannot be read: {error.strerror}") from None
+    except CartctlError:
+        raise
+    except (OSError, ValueError) as error:
+        why = error.strerror if isinstance(error, OSError) else str(error)
+        raise MissingUrdfError(f"{str(path)[:80]!r} cannot be read: {why}") from None
+    except RuntimeError as error:
+        raise UrdfError(f"{path} cannot be read: {error}") from None
 
 
 def parse(data: str | bytes, label: str, folders: MeshFolders) -> Urdf:
@@ -92,6 +102,10 @@ def parse(data: str | bytes, label: str, folders: MeshFolders) -> Urdf:
         raise NoJointsError(
             f"{label} holds {len(joints)} joints, none that moves; expected revolute, continuous or prismatic ones"
         )
+    if len(joints) > _MOST_JOINTS:
+        raise UrdfError(f"{label} holds {len(joints)} joints; expected at most {_MOST_JOINTS}")
+    if not root.get("name"):
+        root.set("name", "robot")
     urdf = Urdf(root, label, movable, _mimics(root, label, movable))
     _resolve_meshes(urdf, folders)
     return urdf
@@ -114,11 +128,18 @@ def _check_numbers(root: Element, label: str) -> None:
             if key not in _NUMERIC or (key == "value" and element.tag != "mass"):
                 continue
             try:
-                good = all(math.isfinite(float(part)) for part in text.split())
+                numbers = [float(part) for part in text.split()]
             except ValueError:
-                good = False
-            if not good:
-                raise UrdfError(f"{label}: <{element.tag} {key}={text!r}>; expected finite numbers")
+                numbers = [math.nan]
+            what = f"{label}: <{element.tag} {key}={text[:40]!r}>"
+            if not all(map(math.isfinite, numbers)):
+                raise UrdfError(f"{what}; expected finite numbers")
+            if len(numbers) != _LENGTHS.get(key, 3 if key == "scale" else 1):
+                raise UrdfError(f"{what} has {len(numbers)} numbers; expected {_LENGTHS.get(key, 1)}")
+            if element.tag != "limit" and any(abs(x) > _LARGEST for x in numbers):
+                raise UrdfError(f"{what}; expected magnitudes of at most {_LARGEST:g}")
+            if (element.tag, key) in _NEVER_NEGATIVE and numbers[0] < -_NOISE:
+                raise UrdfError(f"{what} is negative; expected at least 0")
 
 
 def _check_tree(root: Element, label: str) -> dict[str, str]:
@@ -134,7 +155,7 @@ def _check_tree(root: Element, label: str) -> dict[str, str]:
             )
         if kind not in (*MOVABLE, "fixed"):
             raise UrdfError(f"{label}: joint {name!r} has type {kind!r}; expected {', '.join(MOVABLE)} or fixed")
-        _complete_limit(joint, name, kind, label)
+        _check_motion(joint, name, kind, label)
         ends = [_end(joint, end, name, links, label) for end in ("parent", "child")]
         if ends[1] in parents:
             raise UrdfError(f"{label}: link {ends[1]!r} has two parent joints; expected a tree")
@@ -145,8 +166,11 @@ def _check_tree(root: Element, label: str) -> dict[str, str]:
     return {name: joint.get("type", "") for name, joint in joints.items()}
 
 
-def _complete_limit(joint: Element, name: str, kind: str, label: str) -> None:
-    """A turning or sliding joint needs its range; effort and velocity, if left out, become 0: no limit known."""
+def _check_motion(joint: Element, name: str, kind: str, label: str) -> None:
+    """A moving joint needs an axis and a range; effort and velocity, if left out, become 0: no limit known."""
+    axis = joint.find("axis")
+    if kind in MOVABLE and axis is not None and not any(float(x) for x in axis.get("xyz", "1 0 0").split()):
+        raise UrdfError(f"{label}: joint {name!r} has the axis 0 0 0; expected a direction")
     limit = joint.find("limit")
     if limit is None:
         if kind in ("revolute", "prismatic"):
@@ -194,6 +218,10 @@ def _mimics(root: Element, label: str, movable: dict[str, str]) -> dict[str, Mim
         master = mimic.get("joint", "")
         if master not in movable:
             raise UrdfError(f"{label}: joint {name!r} mimics {master!r}, which is no movable joint")
+        if master == name or (master in found and found[master].master == name):
+            raise UrdfError(
+                f"{label}: joint {name!r} mimics itself, by way of {master!r}; expected an independent master"
+            )
         found[name] = Mimic(master, float(mimic.get("multiplier", 1.0)), float(mimic.get("offset", 0.0)))
     return found
 
@@ -204,6 +232,8 @@ def _resolve_meshes(urdf: Urdf, folders: MeshFolders) -> None:
         for shape in [*link.findall("visual"), *link.findall("collision")]:
             mesh = shape.find("geometry/mesh")
             if mesh is None:
+                if shape.find("geometry/*") is None:
+                    link.remove(shape)  # an empty geometry shows nothing
                 continue
             filename = mesh.get("filename", "")
             path = folders.find(filename) if filename else None

@@ -3,25 +3,25 @@
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Callable, Sequence
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 
 from cartctl import checks
-from cartctl.algebra.metric import as_metric
-from cartctl.checks import FloatArray, is_finite
-from cartctl.errors import NoTasksError, ParameterError, ProblemError, UnsupportedProblem
-from cartctl.levels import Command, Level, get_level
+from cartctl.checks import LARGEST, FloatArray, is_moderate
+from cartctl.errors import CartctlWarning, NoTasksError, ParameterError, ProblemError, UnsupportedProblem
+from cartctl.levels import Command, Level, Secondary, get_level
+from cartctl.levels.metrics import as_state_metric
 from cartctl.model.limits import Limits
 from cartctl.model.robot import Robot
 from cartctl.model.state import State
+from cartctl.motion.extremal_start import onto_extremal_set
 from cartctl.motion.limiting import ROBOT_LIMITS, RobotLimits, usable_limits
 from cartctl.objectives.base import Objective
 from cartctl.solvers import Solver, get_solver, solvers_that_honour
 from cartctl.tasks.base import Task
-
-_METRICS: Final = ("identity", "inertia")
 
 
 class Controller:
@@ -29,9 +29,10 @@ class Controller:
 
     tasks: one Task or more. solver: a name from :func:`cartctl.solvers`, or an instance. level: ``"velocity"``. limits:
     Limits, None (off), or by default the robot's own where the solver honours bounds, else off with one warning.
-    objective: an Objective for the null space. metric: None or ``"identity"``, ``"inertia"`` (least kinetic energy), an
-    (nv,) or (nv, nv) array, or a function of the State that returns one. dt: s, the step it is called with.
-    soft_start: s over which the objective rises to its full share, so that the null space does not start with a jump.
+    objective: an Objective for the null space. metric: None or ``"identity"``, ``"inertia"`` (least kinetic energy),
+    ``"joint-limits"`` (Chan & Dubey), an (nv,) or (nv, nv) array, or a function of the State that returns one. dt: s,
+    the step it is called with; a gain that cannot be stable at it is a CartctlWarning. soft_start: s over which the
+    objective rises to its full share, so that the null space does not start with a jump.
 
     Raises NoTasksError, ProblemError, TimeStepError, FrameNotFound, JointNotFound, SolverNotFound, LevelNotFound,
     UnsupportedProblem, MetricError, ParameterError, NonFiniteError.
@@ -58,12 +59,16 @@ class Controller:
         self.limits = usable_limits(limits, robot, self.solver, self.level)
         self.objective = _checked_objective(objective, self.solver)
         self.metric = metric
+        self._alone = Secondary()
+        self._extend = getattr(self.solver, "gain", None) if self.solver.extends else None
         self.dt = checks.duration("dt", dt)
+        _warn_of_unstable_gains(self.tasks, self.dt)
         self.soft_start = checks.number("soft_start", soft_start, low=0.0)
-        self._metric = _metric(metric, robot)
+        self._metric = as_state_metric(metric, robot.nv)
         self.solver.prepare()
         self._state = State(robot)
         self._zeros = np.zeros(robot.nv)
+        self._zeros.flags.writeable = False
         self._anchors: list[Any] | None = None
         self._started: float | None = None
 
@@ -71,6 +76,16 @@ class Controller:
         """Forget all that lasts from step to step, as before the first one."""
         self._anchors = None
         self._started = None
+
+    def start(self, q0: FloatArray) -> FloatArray:
+        """Where a rollout from q0 (nq,) begins: q0, or for a solver that keeps an objective extremal, on that set.
+
+        Raises ShapeError, NonFiniteError, ConfigurationError. A CartctlWarning where the set is not reached.
+        """
+        q0 = self.robot.check_configuration(q0, "q0")
+        if not self.solver.extends or self.objective is None:
+            return q0
+        return onto_extremal_set(self.robot, self.tasks, self.objective, q0)
 
     def step(self, q: FloatArray, v: FloatArray | None = None, t: float = 0.0) -> Command:
         """The command at configuration q (nq,), velocity v (nv,) (zeros if None) and time t in s.
@@ -82,17 +97,15 @@ class Controller:
         anchors = self._anchors if self._anchors is not None else [task.anchor(state) for task in self.tasks]
         metric = self._metric if self._metric is None or isinstance(self._metric, np.ndarray) else self._metric(state)
         started = t if self._started is None else self._started
-        rise = 1.0 if self.objective is None else self._rise(t - started)
-        problem, references = self.level.problem(state, self.tasks, t, anchors, self.objective, rise, metric)
+        secondary = self._alone if self.objective is None else self._secondary(t - started)
+        problem, references = self.level.problem(state, self.tasks, t, anchors, secondary, metric)
         self._anchors, self._started = anchors, started  # only now: a refused step leaves no trace
         return self.level.command(self.solver.solve(problem), references)
 
-    def _rise(self, elapsed: float) -> float:
-        """The share of the objective that counts: 3 x^2 - 2 x^3 over the soft start, then 1."""
-        if elapsed >= self.soft_start:
-            return 1.0
-        x = max(elapsed, 0.0) / self.soft_start
-        return x * x * (3.0 - 2.0 * x)
+    def _secondary(self, elapsed: float) -> Secondary:
+        """The objective, its share rising as 3 x^2 - 2 x^3 over the soft start."""
+        x = 1.0 if elapsed >= self.soft_start else max(elapsed, 0.0) / self.soft_start
+        return Secondary(self.objective, x * x * (3.0 - 2.0 * x), self._extend)
 
     def observe(self, q: FloatArray, v: FloatArray | None = None, t: float = 0.0) -> State:
         """The controller's own State, moved to (q, v); valid until the next call. Raises as :meth:`step`."""
@@ -101,14 +114,14 @@ class Controller:
             type(q) is np.ndarray
             and q.dtype == np.float64
             and q.shape == (robot.nq,)
-            and is_finite(q)
+            and is_moderate(q)
             and robot.is_on_manifold(q)
         ):
             q = robot.check_configuration(q)
         if v is None:
             v = self._zeros
-        elif not (type(v) is np.ndarray and v.dtype == np.float64 and v.shape == (robot.nv,) and is_finite(v)):
-            v = checks.vector("v", v, robot.nv)
+        elif not (type(v) is np.ndarray and v.dtype == np.float64 and v.shape == (robot.nv,) and is_moderate(v)):
+            v = checks.vector("v", v, robot.nv, largest=LARGEST)
         if not (type(t) is float and math.isfinite(t)):
             checks.number("t", t)
         self._state.set(q, v)
@@ -136,12 +149,17 @@ def _checked_tasks(tasks: Task | Sequence[Task], robot: Robot) -> tuple[Task, ..
 
 def _checked_objective(objective: Objective | None, solver: Solver) -> Objective | None:
     if objective is None:
+        if solver.extends:
+            raise ProblemError(
+                f"solver {solver.name!r} has no objective to keep extremal; give one, as cc.JointRange()"
+            )
         return None
     if not isinstance(objective, Objective):
         raise ParameterError(
             f"objective is a {type(objective).__name__}; expected an Objective such as cc.JointRange()"
         )
-    if "reference" not in solver.honours:
+    checks.number(f"the gain of {type(objective).__name__}", objective.gain, low=0.0)
+    if "reference" not in solver.honours and not solver.extends:
         able = ", ".join(repr(s) for s in solvers_that_honour("reference"))
         raise UnsupportedProblem(
             f"solver {solver.name!r} has no null-space term for an objective; use {able}, or objective=None"
@@ -149,12 +167,14 @@ def _checked_objective(objective: Objective | None, solver: Solver) -> Objective
     return objective
 
 
-def _metric(metric: Any, robot: Robot) -> FloatArray | Callable[[State], FloatArray] | None:
-    if metric is None or (isinstance(metric, str) and metric == "identity"):
-        return None
-    if isinstance(metric, str):
-        checks.choice("metric", metric, _METRICS)
-        return lambda state: state.mass_matrix
-    if callable(metric):
-        return lambda state: as_metric(metric(state), robot.nv)
-    return as_metric(metric, robot.nv)
+def _warn_of_unstable_gains(tasks: Sequence[Task], dt: float) -> None:
+    """A sampled error shrinks by (1 - k dt) a step: above k dt = 2 it grows."""
+    for task in tasks:
+        gain = float(np.max(task.gain, initial=0.0))
+        if gain * dt >= 2.0:
+            warnings.warn(
+                f"task {task.name!r}: gain {gain:g} 1/s times dt {dt:g} s is {gain * dt:.3g}; the loop is unstable "
+                f"from 2 on; use a gain below {1.0 / dt:g}, or a smaller dt",
+                CartctlWarning,
+                stacklevel=3,
+            )

@@ -54,11 +54,16 @@ class JointMetrics:
 
 @dataclass(frozen=True)
 class Metrics:
-    """A run in figures. path_drift: largest joint distance over a closed cycle, rad or m, None without one."""
+    """A run in figures.
+
+    path_drift: largest joint distance over a closed cycle, rad or m, None without one. effort: integral of
+    ``||v||^2 dt``, rad^2/s or m^2/s, each command held over its step.
+    """
 
     tasks: list[TaskMetrics]
     joints: list[JointMetrics]
     path_drift: float | None
+    effort: float
     step_p50: float
     step_p99: float
     status: dict[str, int]
@@ -83,6 +88,7 @@ def measure(run: Run, after: float = 0.0) -> Metrics:
         tasks=[_task(task, kept) for task in run.tasks],
         joints=_joints(run),
         path_drift=_drift(run),
+        effort=float(np.sum(run.v[1:] ** 2) * run.meta["dt"]),
         step_p50=float(p50),
         step_p99=float(p99),
         status=dict(Counter(run.status)),

@@ -29,7 +29,7 @@ class Recorder:
         self._q, self._v = np.zeros((steps + 1, robot.nq)), np.zeros((steps + 1, robot.nv))
         self._command, self._spent = np.zeros((steps, robot.nv)), np.zeros(steps)
         self._status: list[str] = []
-        self._tasks = [_TaskRows(len(task.units(robot)), robot.nv, steps) for task in controller.tasks]
+        self._tasks = [_TaskRows(task.units(robot), robot.nv, steps) for task in controller.tasks]
 
     def time_of(self, k: int) -> float:
         """The time of step k in s; a product, so that it does not drift as a sum would."""
@@ -65,10 +65,7 @@ class Recorder:
         n = self._made if self._closed else max(self._made - 1, 0)
         samples = n + 1 if self._made else 0
         controller = self._controller
-        records = [
-            rows.record(task, controller.robot, n, samples)
-            for rows, task in zip(self._tasks, controller.tasks, strict=True)
-        ]
+        records = [rows.record(task, n, samples) for rows, task in zip(self._tasks, controller.tasks, strict=True)]
         return Run(
             meta=_meta(controller, interrupted),
             time=self._t0 + controller.dt * np.arange(samples, dtype=np.float64),
@@ -85,7 +82,8 @@ class Recorder:
 class _TaskRows:
     """One task's arrays."""
 
-    def __init__(self, m: int, nv: int, steps: int) -> None:
+    def __init__(self, units: list[str], nv: int, steps: int) -> None:
+        self.units, m = units, len(units)
         self.error = np.zeros((steps + 1, m))
         self.scale = np.ones(steps)
         self.singular = np.zeros((steps + 1, min(m, nv)))
@@ -100,12 +98,12 @@ class _TaskRows:
             self.target = np.zeros_like(self.value)
         self.value[k], self.target[k] = observation.value, observation.target
 
-    def record(self, task: Any, robot: Any, n: int, samples: int) -> TaskRecord:
+    def record(self, task: Any, n: int, samples: int) -> TaskRecord:
         return TaskRecord(
             name=task.name,
             kind=task.kind,
             frame=task.frame,
-            units=task.units(robot),
+            units=self.units,
             error=self.error[:samples].copy(),
             scale=self.scale[:n].copy(),
             singular_values=self.singular[:samples].copy(),

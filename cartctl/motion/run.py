@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from cartctl import checks
 from cartctl.checks import FloatArray
 from cartctl.errors import RunFileError
 from cartctl.files import whole_file
@@ -121,8 +122,10 @@ class Run:
 
         figure = plot_run(self)
         if path is not None:
+            kind = Path(path).suffix[1:].lower() or "png"
+            checks.choice("the plot's file type", kind, sorted(figure.canvas.get_supported_filetypes()))
             with whole_file(path) as part:
-                figure.savefig(part, dpi=150, format=Path(path).suffix[1:] or "png")
+                figure.savefig(part, dpi=150, format=kind)
         return figure
 
     def html(self, path: str | os.PathLike[str]) -> Path:

@@ -11,11 +11,12 @@ import numpy as np
 
 from cartctl import checks
 from cartctl.checks import FloatArray
-from cartctl.errors import RunInterrupted, TimeStepError
+from cartctl.errors import ParameterError, RunInterrupted, TimeStepError
 from cartctl.motion.controller import Controller
 from cartctl.motion.recorder import Recorder
 from cartctl.motion.run import Run
 
+_MOST = 10_000_000  # steps a rollout records
 _TELL_EVERY = 0.05  # s of wall time between calls of progress
 
 
@@ -29,18 +30,24 @@ def simulate(
     progress: Callable[[int, int], None] | None = None,
     save: str | os.PathLike[str] | None = None,
 ) -> Run:
-    """Run ``controller`` from q0 (nq,) (home if None) for ``duration`` s in steps of controller.dt: a Run.
+    """Run ``controller`` from q0 (nq,) (home if None) for ``duration`` s, in whole steps of controller.dt: a Run.
+
+    A solver that keeps an objective extremal starts on that set (:meth:`Controller.start`).
 
     Kinematic: the robot moves exactly as commanded, ``q <- q (+) v dt``. The controller is reset first. progress(k, n)
     is called now and then with steps made and to make. save: a .npz file, written however the rollout ends.
 
-    Raises RunInterrupted on Ctrl-C, with every step made so far in ``.run``; TimeStepError for a duration below one
-    step, and whatever :meth:`Controller.step` raises.
+    Raises RunInterrupted on Ctrl-C, with every step made so far in ``.run``; TimeStepError for a duration that is not
+    positive or takes too many steps, and whatever :meth:`Controller.step` raises.
     """
+    if not isinstance(controller, Controller):
+        raise ParameterError(f"controller is a {type(controller).__name__}; expected a cc.Controller")
+    if progress is not None and not callable(progress):
+        raise ParameterError(f"progress is a {type(progress).__name__}; expected a function of steps made and to make")
     robot, dt = controller.robot, controller.dt
     steps = _steps(checks.duration("duration", duration), dt)
-    q = robot.home if q0 is None else robot.check_configuration(q0, "q0")
-    v = np.zeros(robot.nv) if v0 is None else checks.vector("v0", v0, robot.nv)
+    q = controller.start(robot.home if q0 is None else q0)
+    v = np.zeros(robot.nv) if v0 is None else checks.vector("v0", v0, robot.nv, largest=checks.LARGEST)
     controller.reset()
     recorder = Recorder(controller, steps, checks.number("t0", t0))
     try:
@@ -63,7 +70,13 @@ def _kept(recorder: Recorder, save: str | os.PathLike[str] | None, *, interrupte
 
 def _steps(duration: float, dt: float) -> int:
     """Whole steps that cover the duration, forgiving the round-off of duration / dt."""
-    steps = int(np.ceil(duration / dt - 1e-9))
+    wanted = np.ceil(duration / dt - 1e-9)
+    if not wanted <= _MOST:
+        raise TimeStepError(
+            f"duration {duration:g} s in steps of dt = {dt:g} s is {wanted:.3g} steps; expected at most {_MOST:.0e}: "
+            "a larger dt, or several rollouts"
+        )
+    steps = int(wanted)
     if steps < 1:
         raise TimeStepError(f"duration is {duration:g} s; expected at least one step of {dt:g} s")
     return steps

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from cartctl.errors import RunFileError
+from cartctl.errors import ParameterError, RunFileError
 from cartctl.files import whole_file
 from cartctl.motion.run import Run, TaskRecord
 
@@ -20,8 +20,13 @@ _TASK_ARRAYS = ("error", "scale", "singular_values", "pose", "target")
 
 def save(run: Run, path: Path) -> Path:
     """Write ``run``; the file appears whole or not at all."""
-    if path.suffix != ".npz":
-        path = path.with_name(path.name + ".npz")
+    if path.suffix not in ("", ".npz"):
+        raise ParameterError(
+            f"path ends in {path.suffix!r}; expected .npz (run.to_csv and run.to_parquet write tables)"
+        )
+    if path.is_dir():
+        raise ParameterError(f"path is the folder {str(path)!r}; expected the name of a .npz file")
+    path = path.with_suffix(".npz")
     arrays: dict[str, Any] = {name: getattr(run, name) for name in _ARRAYS}
     names = sorted(set(run.status))
     header: dict[str, Any] = {"format": _FORMAT, "meta": run.meta, "status": names, "tasks": []}
@@ -46,6 +51,7 @@ def load(path: Path) -> Run:
             raise RunFileError(f"{path} has format {header['format']}; expected {_FORMAT}, as this version writes")
         tasks = [_task(i, entry, arrays) for i, entry in enumerate(header["tasks"])]
         status = [header["status"][code] for code in arrays["status"]]
+        _check(arrays, tasks, path)
         return Run(meta=header["meta"], status=status, tasks=tasks, **{n: arrays[n] for n in _ARRAYS})
     except FileNotFoundError:
         raise RunFileError(f"{path}: no such file; expected a .npz written by Run.save") from None
@@ -60,3 +66,16 @@ def load(path: Path) -> Run:
 def _task(i: int, entry: dict[str, Any], arrays: dict[str, Any]) -> TaskRecord:
     values: dict[str, Any] = {n: arrays.get(f"task{i}_{n}") for n in _TASK_ARRAYS}
     return TaskRecord(**entry, **values)
+
+
+def _check(arrays: dict[str, Any], tasks: list[TaskRecord], path: Path) -> None:
+    """One length throughout and nothing but finite numbers; raises RunFileError."""
+    samples, steps = len(arrays["time"]), len(arrays["command"])
+    per_sample = [arrays[n] for n in ("time", "q", "v")]
+    per_sample += [a for t in tasks for a in (t.error, t.singular_values, t.pose, t.target) if a is not None]
+    per_step = [arrays["command"], arrays["solve_time"], arrays["status"], *(t.scale for t in tasks)]
+    lengths = {len(a) for a in per_sample} == {samples} and {len(a) for a in per_step} == {steps}
+    if not lengths or samples not in (steps + 1, 0):
+        raise RunFileError(f"{path} holds arrays that do not belong together; expected N + 1 samples of N steps")
+    if not all(np.isfinite(a).all() for a in [*per_sample, *per_step]):
+        raise RunFileError(f"{path} holds nan or inf; expected the finite numbers that Run.save writes")

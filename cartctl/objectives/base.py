@@ -5,8 +5,12 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from typing import ClassVar
 
+import numpy as np
+
 from cartctl.checks import FloatArray
 from cartctl.model.state import State
+
+_STEP = 6e-6  # cube root of the round-off: where a central difference is at its best
 
 
 class Objective(ABC):
@@ -25,6 +29,15 @@ class Objective(ABC):
     @abstractmethod
     def gradient(self, state: State) -> FloatArray:
         """``dH/dq`` in the tangent space, (nv,)."""
+
+    def hessian(self, state: State) -> FloatArray:
+        """``d2H/dq2``, (nv, nv); central differences of the gradient unless a subclass knows better."""
+        robot = state.robot
+        columns = []
+        for step in _STEP * np.eye(robot.nv):
+            ends = [self.gradient(robot.state(robot.integrate(state.q, s * step), state.v)) for s in (1.0, -1.0)]
+            columns.append((ends[0] - ends[1]) / (2.0 * _STEP))
+        return np.array(columns).T  # type: ignore[no-any-return]
 
     def direction(self, state: State) -> FloatArray:
         """``u0``, (nv,), at the velocity level."""

@@ -40,6 +40,10 @@ class JointRange(Objective):
         gap, weight = self._terms(state)
         return weight * gap
 
+    def hessian(self, state: State) -> FloatArray:
+        """``diag(1 / (n range_i^2))``, (nv, nv)."""
+        return np.diag(self._terms(state)[1])
+
     def _terms(self, state: State) -> tuple[FloatArray, FloatArray]:
         robot = state.robot
         limits = self.limits or robot.limits

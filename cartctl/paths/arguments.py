@@ -49,9 +49,7 @@ def positive(name: str, value: Any, unit: str) -> float:
     """Return a float of at least 1e-9; raises as :func:`number`, and PathError."""
     result = number(name, value)
     if result < SMALLEST:
-        raise PathError(
-            f"{name} is {result:g} {unit}: expected a positive number (at least {SMALLEST:g} {unit})"
-        )
+        raise PathError(f"{name} is {result:g} {unit}: expected a positive number (at least {SMALLEST:g} {unit})")
     return result
 
 
@@ -86,9 +84,7 @@ def array(name: str, value: Any, shape: tuple[int | str, ...]) -> Array:
     )
     if bools or raw.dtype.kind not in "iuf":
         raise ParameterError(f"{name} is {show(value)}: expected numbers of shape {_shape(shape)}")
-    fits = raw.ndim == len(shape) and all(
-        isinstance(s, str) or s == n for s, n in zip(shape, raw.shape, strict=True)
-    )
+    fits = raw.ndim == len(shape) and all(isinstance(s, str) or s == n for s, n in zip(shape, raw.shape, strict=True))
     if not fits:
         raise ShapeError(f"{name} has shape {raw.shape}: expected {_shape(shape)}")
     if not np.isfinite(raw).all():

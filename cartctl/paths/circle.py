@@ -83,9 +83,7 @@ class Circle(PlaneLoop):
         heading = -place.position if towards is None else direction("Circle towards", towards)
         if np.linalg.norm(np.cross(n, heading)) < max(SMALLEST, 1e-6 * float(np.linalg.norm(heading))):
             given = "from the start to the world's origin" if towards is None else show(towards)
-            raise PathError(
-                f"Circle towards ({given}) is parallel to the normal: give a direction in the plane"
-            )
+            raise PathError(f"Circle towards ({given}) is parallel to the normal: give a direction in the plane")
         x = in_plane(-heading, n)
         centre = place.position - positive("Circle radius", radius, "m") * x
         return cls(centre, radius, period, laps, n, place.rotation, 0.0, timing, x)

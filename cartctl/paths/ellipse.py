@@ -107,9 +107,7 @@ class Lissajous(Loop):
             )
         turned = centre.rotation if self.axes is None else rotation("Lissajous axes", self.axes)
         frame = frozen(np.eye(3) if turned is None else turned)
-        self._set(
-            center=centre.position, amplitudes=amplitudes, frequencies=frequencies, phases=phases, axes=frame
-        )
+        self._set(center=centre.position, amplitudes=amplitudes, frequencies=frequencies, phases=phases, axes=frame)
         waves = list(zip(amplitudes.tolist(), frequencies, phases.tolist(), strict=True))
         self._set(_waves=waves, _frame=frozen(frame.T))
 

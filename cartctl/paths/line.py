@@ -49,14 +49,10 @@ class Line(Path):
         turn = None if first is None or last is None else Turn(first, last)
         step = end.position - start.position
         if np.linalg.norm(step) < SMALLEST and (turn is None or turn.angle < SMALLEST):
-            raise PathError(
-                f"Line end is its start, {show(start.position)}: expected two different points or poses"
-            )
+            raise PathError(f"Line end is its start, {show(start.position)}: expected two different points or poses")
         law = timing_law(self.timing)
         duration = positive("Line duration", self.duration, "s")
-        self._set(
-            start=posed(start.position, first), end=posed(end.position, last), duration=duration, timing=law
-        )
+        self._set(start=posed(start.position, first), end=posed(end.position, last), duration=duration, timing=law)
         self._set(_law=law, _origin=start.position.tolist(), _step=step.tolist(), _turn=turn)
 
     def __call__(self, t: float) -> PathSample:

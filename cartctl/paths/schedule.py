@@ -19,9 +19,7 @@ def spread(chords: list[float], duration: float, law: TimingLaw, stop: bool) -> 
     """Return passing times (n,) for a duration; raises PathError where two neighbours coincide."""
     for k, distance in enumerate(chords):
         if distance < SMALLEST:
-            raise PathError(
-                f"Waypoints poses {k} and {k + 1} coincide: expected times=, to say how long to wait there"
-            )
+            raise PathError(f"Waypoints poses {k} and {k + 1} coincide: expected times=, to say how long to wait there")
     way = np.cumsum([0.0, *chords])
     shares = np.minimum(way / way[-1], 1.0).tolist()
     times = [duration * (share if stop else law.inverse(share)) for share in shares]

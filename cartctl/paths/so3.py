@@ -78,9 +78,7 @@ def vector_rates(theta: Array, omega: Array, alpha: Array) -> tuple[Array, Array
     return rate, np.linalg.solve(J, alpha - bias)
 
 
-def _cross(
-    a: tuple[float, ...] | list[float], b: tuple[float, ...] | list[float]
-) -> tuple[float, float, float]:
+def _cross(a: tuple[float, ...] | list[float], b: tuple[float, ...] | list[float]) -> tuple[float, float, float]:
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 

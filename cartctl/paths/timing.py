@@ -77,9 +77,7 @@ class SmoothTrapezoid(TimingLaw):
         """Check the ramp."""
         object.__setattr__(self, "ramp", number("SmoothTrapezoid ramp", self.ramp))
         if not 0.001 <= self.ramp <= 0.5:
-            raise ParameterError(
-                f"SmoothTrapezoid ramp is {self.ramp:g}: expected a fraction from 0.001 to 0.5"
-            )
+            raise ParameterError(f"SmoothTrapezoid ramp is {self.ramp:g}: expected a fraction from 0.001 to 0.5")
 
     def __call__(self, tau: float) -> TimingSample:
         """Return s, ds/dtau, d2s/dtau2 at tau in [0, 1]."""

@@ -91,9 +91,7 @@ class Waypoints(Path):
             return end
         duration = positive("Waypoints duration", self.duration, "s")
         if abs(duration - end) > 1e-9 * end:
-            raise PathError(
-                f"Waypoints duration is {duration:g} s, times end at {end:g} s: expected one of them"
-            )
+            raise PathError(f"Waypoints duration is {duration:g} s, times end at {end:g} s: expected one of them")
         return end
 
 

@@ -23,8 +23,8 @@ class View:
     aspect: float
 
 
-def view(points: Array) -> View:
-    """Return the closest view that shows all ``points`` (n, 3).
+def view(points: Array, margin: float = MARGIN, lift: float = LIFT) -> View:
+    """Return the closest view that shows all ``points`` (n, 3), with ``margin`` and ``lift`` as the constants above.
 
     With tan = tan(FOV / 2), a point at (x, y) across and z towards the camera is inside the picture from the
     distance D where |y| <= (D - z) tan and |x| <= (D - z) tan * aspect.
@@ -34,9 +34,9 @@ def view(points: Array) -> View:
     box = np.stack([points @ right, points @ up, points @ toward], axis=1)
     middle = (box.min(axis=0) + box.max(axis=0)) / 2
     x, y, z = np.abs(box[:, 0] - middle[0]), np.abs(box[:, 1] - middle[1]), box[:, 2] - middle[2]
-    distance = float(max(MARGIN * np.max(z + np.maximum(y, x / ASPECT) / tan), 0.05))
-    aspect = MARGIN * float(np.max(x / (distance - z))) / tan
-    middle[1] -= LIFT * distance * tan
+    distance = float(max(margin * np.max(z + np.maximum(y, x / ASPECT) / tan), 0.05))
+    aspect = margin * float(np.max(x / (distance - z))) / tan
+    middle[1] -= lift * distance * tan
     return View(middle @ np.stack([right, up, toward]), distance * toward, max(aspect, 0.1))
 
 

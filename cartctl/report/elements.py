@@ -46,19 +46,49 @@ class ShadedGeometry(mg.Geometry):  # type: ignore[misc]
         return {"uuid": self.uuid, "type": "BufferGeometry", "data": data}
 
 
+class BorrowedGeometry(mg.Geometry):  # type: ignore[misc]
+    """The geometry of another object; the page lends it, so that a copy costs no bytes and no graphics memory."""
+
+    def __init__(self, owner: mg.Geometry) -> None:
+        super().__init__()
+        self.owner = owner
+
+    def lower(self, object_data: dict[str, Any]) -> dict[str, Any]:
+        """Return an empty BufferGeometry that names the one to put in its place."""
+        borrowed = {"borrows": self.owner.uuid}
+        return {"uuid": self.uuid, "type": "BufferGeometry", "data": {"attributes": {}}, "userData": borrowed}
+
+
+def ghost(owner: mg.Geometry, color: int, opacity: float, rank: int) -> Any:
+    """Return a drawable translucent copy of what ``owner`` shows, in one colour (0xRRGGBB).
+
+    Where copies coincide with it and with each other, the one of the lowest ``rank`` (the owner's is 0) is seen.
+    """
+    material = mg.MeshPhongMaterial(
+        color=color, opacity=opacity, transparent=True, specular=0x1C1C1C, shininess=35, **_behind(rank)
+    )
+    return mg.Mesh(BorrowedGeometry(owner), material)
+
+
+def _behind(rank: int) -> dict[str, Any]:
+    return {"polygonOffset": True, "polygonOffsetFactor": rank, "polygonOffsetUnits": 4 * rank} if rank else {}
+
+
 def solid(mesh: Shaded, opacity: float = 1.0) -> Any:
     """Return a drawable object with a matt surface in the mesh's own colours."""
     material = mg.MeshPhongMaterial(vertexColors=True, opacity=opacity, specular=0x1C1C1C, shininess=35)
     return mg.Mesh(ShadedGeometry(mesh), material)
 
 
-def glow(mesh: Shaded, opacity: float = 1.0, through: bool = False) -> Any:
+def glow(mesh: Shaded, opacity: float = 1.0, through: bool = False, rank: int = 0) -> Any:
     """Return a drawable object that no light changes: markers and paths keep the colour of the legend.
 
     ``through=True`` shows it even where something stands in front. All of them are drawn after the solid things, in
-    the order of their nodes' ``renderOrder``.
+    the order of their nodes' ``renderOrder``. ``rank``: as of a :func:`ghost`.
     """
-    material = mg.MeshBasicMaterial(vertexColors=True, opacity=opacity, depthTest=not through, transparent=True)
+    material = mg.MeshBasicMaterial(
+        vertexColors=True, opacity=opacity, depthTest=not through, transparent=True, **_behind(rank)
+    )
     return mg.Mesh(ShadedGeometry(mesh), material)
 
 

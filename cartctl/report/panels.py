@@ -6,18 +6,17 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+from numpy.typing import NDArray
 
+from cartctl.report.axes import LEGEND, finish, line, logarithmic, mark_limits, note
 from cartctl.report.mesh import Array
 from cartctl.report.palette import COLORS, Pen, pens, plain, thinned
 
 if TYPE_CHECKING:
     from cartctl.motion.run import Run, TaskRecord
 
-LIMIT = "#7a1f1f"  # of the lines that mark a limit
 MARKED = {"m": (1e3, "Position error", "mm"), "rad": (1e3, "Orientation error", "mrad"), "": (1.0, "Error", "")}
 QUIET = ("OPTIMAL", "INEXACT", "DAMPED")  # statuses of a step that went as it should
-DECADES = 9  # shown at most on a logarithmic axis, counted from its top
 
 
 def error(axes: Any, run: Run, unit: str) -> None:
@@ -25,12 +24,12 @@ def error(axes: Any, run: Run, unit: str) -> None:
     factor, title, shown = MARKED[unit]
     records = [r for r in run.tasks if unit in r.units]
     for record, pen in zip(records, pens([r.name for r in records]), strict=True):
-        _line(axes, run.time, factor * norm(record, unit), pen)
+        line(axes, run.time, factor * norm(record, unit), pen)
     if unit == "rad" and not {record.kind for record in records} <= {"frame", "relative"}:
         title = "Angular error"
     _trouble(axes, run)
-    _logarithmic(axes)
-    _finish(axes, title, shown)
+    logarithmic(axes)
+    finish(axes, title, shown)
     axes.legend(loc="best", **LEGEND)
 
 
@@ -47,27 +46,33 @@ def positions(axes: Any, run: Run, joints: Sequence[Pen]) -> None:
     limited = np.isfinite(span) & (span > 0)
     values = coordinates(run)
     for i in np.flatnonzero(limited).tolist():
-        _line(axes, run.time, (values[:, i] - limits.position_lower[i]) / span[i], joints[i])
-    _limits(axes, 0.0, 1.0)
-    _finish(axes, "Joint positions", "fraction of range")
+        line(axes, run.time, (values[:, i] - limits.position_lower[i]) / span[i], joints[i])
+    mark_limits(axes, 0.0, 1.0)
+    finish(axes, "Joint positions", "fraction of range")
     _absent(axes, run, limited, "position limits")
 
 
 def rates(axes: Any, run: Run, joints: Sequence[Pen]) -> None:
     """Draw each joint's velocity over its limit in that direction."""
+    limited, share = speed(run)
+    for k, i in enumerate(np.flatnonzero(limited).tolist()):
+        line(axes, run.time, share[:, k], joints[i])
+    finish(axes, "Joint rates", "fraction of limit")
+    if limited.any():
+        ratio = np.abs(share)
+        if ratio.max() > 0.4:
+            mark_limits(axes, -1.0, 1.0)
+        fastest = run.robot.dof_names[np.flatnonzero(limited)[int(ratio.max(axis=0).argmax())]]
+        note(axes, f"peak {100 * ratio.max():.3g} % ({plain(fastest)})")
+    _absent(axes, run, limited, "velocity limits")
+
+
+def speed(run: Run) -> tuple[NDArray[np.bool_], Array]:
+    """Return which joints (nv,) have velocity limits, and their rates (N+1, k) over the limit in that direction."""
     limits = run.robot.limits
     bound = np.where(run.v >= 0, limits.velocity_upper, -limits.velocity_lower)
     limited = (np.isfinite(limits.velocity_upper - limits.velocity_lower)) & (bound > 0).all(axis=0)
-    for i in np.flatnonzero(limited).tolist():
-        _line(axes, run.time, run.v[:, i] / bound[:, i], joints[i])
-    _finish(axes, "Joint rates", "fraction of limit")
-    if limited.any():
-        ratio = np.abs(run.v[:, limited] / bound[:, limited])
-        if ratio.max() > 0.4:
-            _limits(axes, -1.0, 1.0)
-        fastest = run.robot.dof_names[np.flatnonzero(limited)[int(ratio.max(axis=0).argmax())]]
-        _note(axes, f"peak {100 * ratio.max():.3g} % ({plain(fastest)})")
-    _absent(axes, run, limited, "velocity limits")
+    return limited, run.v[:, limited] / bound[:, limited]
 
 
 def singular_values(axes: Any, run: Run) -> None:
@@ -76,17 +81,17 @@ def singular_values(axes: Any, run: Run) -> None:
     for record, pen in zip(records, pens([r.name for r in records]), strict=True):
         values = np.sort(record.singular_values, axis=1)
         for column in values[:, 1:].T:
-            _line(axes, run.time, column, Pen("", pen.color, pen.dashed, back=True), alpha=0.45)
-        _line(axes, run.time, values[:, 0], Pen(f"{pen.label} (smallest bold)", pen.color, pen.dashed), linewidth=2.0)
-    _logarithmic(axes)
-    _finish(axes, "Singular values of the task Jacobians", "")
+            line(axes, run.time, column, Pen("", pen.color, pen.style, back=True), alpha=0.45)
+        line(axes, run.time, values[:, 0], Pen(f"{pen.label} (smallest bold)", pen.color, pen.style), linewidth=2.0)
+    logarithmic(axes)
+    finish(axes, "Singular values of the task Jacobians", "")
     if records:
         axes.legend(loc="best", **LEGEND)
 
 
 def step_time(axes: Any, run: Run) -> None:
     """Draw the time each step took, with its median and 99th percentile; rare long ones are only named."""
-    _finish(axes, "Time of a control step", "µs")
+    finish(axes, "Time of a control step", "µs")
     if not len(run.solve_time):
         return
     micro = 1e6 * run.solve_time
@@ -94,9 +99,9 @@ def step_time(axes: Any, run: Run) -> None:
     median, late = np.percentile(micro, [50, 99])
     for name, level, style in (("p50", median, "-"), ("p99", late, "--")):
         axes.axhline(level, color="black", linestyle=style, linewidth=1.1, label=f"{name}  {level:.3g} µs")
-    _logarithmic(axes, top=10 * late)
+    logarithmic(axes, top=10 * late)
     if micro.max() > 10 * late:
-        _note(axes, f"longest {micro.max():.3g} µs")
+        note(axes, f"longest {micro.max():.3g} µs")
     axes.legend(loc="upper right", **LEGEND)
 
 
@@ -116,49 +121,6 @@ def urgency(run: Run) -> Array:
     return np.asarray(np.fmax(*(np.nan_to_num(x, nan=0.0, posinf=0.0) for x in (place, speed))))
 
 
-LEGEND = {"fontsize": 8, "framealpha": 0.85, "edgecolor": "0.85", "handlelength": 1.6, "borderpad": 0.35}
-
-
-def _line(axes: Any, time: Array, values: Array, pen: Pen, **options: Any) -> None:
-    axes.plot(*thinned(time, values), **(pen.options() | options))
-
-
-def _finish(axes: Any, title: str, unit: str) -> None:
-    axes.set_title(title, loc="left", fontsize=10, fontweight="bold")
-    axes.set_ylabel(unit)
-    axes.grid(True, which="major", color="0.9", linewidth=0.8)
-    axes.set_axisbelow(True)
-    axes.margins(x=0)
-    axes.spines[["top", "right"]].set_visible(False)
-
-
-def _logarithmic(axes: Any, top: float = np.inf) -> None:
-    """Scale y by decades, at most ``DECADES`` of them and up to ``top``; with nothing but zeros it stays linear."""
-    values = np.concatenate([np.zeros(1), *(np.asarray(line.get_ydata(), dtype=float) for line in axes.get_lines())])
-    positive = values[values > 0]
-    if not positive.size:
-        return
-    top = min(positive.max(), top)
-    low = max(np.percentile(positive, 1), top / 10.0**DECADES)  # the zero from which a run starts has no place here
-    axes.set_yscale("log", nonpositive="mask")
-    axes.set_ylim(low / 1.6, top * 2.5)
-    if top / low < 30:  # within a decade or so, powers of ten alone would say little
-        axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    axes.yaxis.set_minor_formatter(NullFormatter())
-
-
-def _limits(axes: Any, low: float, high: float) -> None:
-    """Mark two limits and shade what lies beyond them."""
-    bottom, top = axes.get_ylim()
-    pad = 0.06 * (high - low)
-    bottom, top = min(bottom, low - pad), max(top, high + pad)
-    for limit, edge in ((low, bottom), (high, top)):
-        axes.axhline(limit, color=LIMIT, linewidth=1.1, zorder=1.8)
-        axes.axhspan(*sorted((limit, edge)), color=LIMIT, alpha=0.08, linewidth=0, zorder=0.5)
-    axes.set_ylim(bottom, top)
-
-
 def _absent(axes: Any, run: Run, limited: Any, what: str) -> None:
     """Name the joints that the panel leaves out because they have no limits."""
     names = [name for name, there in zip(run.robot.dof_names, limited, strict=True) if not there]
@@ -168,11 +130,6 @@ def _absent(axes: Any, run: Run, limited: Any, what: str) -> None:
     elif names:
         listed = ", ".join(map(plain, names[:3])) + (f" and {len(names) - 3} more" if len(names) > 3 else "")
         axes.set_xlabel(f"no limit, not shown: {listed}", loc="right", fontsize=8, color="0.35")
-
-
-def _note(axes: Any, text: str) -> None:
-    """Add a remark at the right end of the title's line."""
-    axes.set_title(text, loc="right", fontsize=8, color="0.35")
 
 
 def _trouble(axes: Any, run: Run) -> None:

@@ -9,10 +9,12 @@ from matplotlib.lines import Line2D
 
 from cartctl.errors import ParameterError
 from cartctl.report import panels
+from cartctl.report.axes import LEGEND
 from cartctl.report.palette import GREY, NAMED, Pen, pens, plain
 
 if TYPE_CHECKING:
     from cartctl.motion.run import Run
+
 
 def plot_run(run: Run) -> Figure:
     """Return a figure of ``run``: errors, joint positions and rates, singular values, step times.
@@ -65,4 +67,4 @@ def _legend(figure: Figure, run: Run, joints: list[Pen]) -> None:
     longest = max((len(str(line.get_label())) for line in shown), default=0)
     room = max(150 // (longest + 8), 1)  # columns that fit side by side
     lines = -(-len(shown) // min(room, 7))
-    figure.legend(handles=shown, loc="outside lower center", ncols=-(-len(shown) // max(lines, 1)), **panels.LEGEND)
+    figure.legend(handles=shown, loc="outside lower center", ncols=-(-len(shown) // max(lines, 1)), **LEGEND)

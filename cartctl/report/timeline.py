@@ -29,6 +29,13 @@ def frames(time: Array) -> IntArray:
     return np.unique(np.clip(np.searchsorted(time, wanted - 1e-9 * span), 0, len(time) - 1)).astype(np.int64)
 
 
+def samples_at(time: Array, moments: Array) -> IntArray:
+    """Return the indices (k,) of the samples at ``moments`` (k,) s past the start; the last one from the end on."""
+    span = float(time[-1] - time[0])
+    found = np.searchsorted(time - time[0], moments - 1e-9 * span)
+    return np.clip(found, 0, len(time) - 1).astype(np.int64)
+
+
 class Timeline:
     """Tracks for meshcat's animation; ``time`` (k,) in s from the run's start."""
 

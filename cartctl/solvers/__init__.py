@@ -15,8 +15,19 @@ from cartctl.solvers.base import EquationSolver, Solver
 _REGISTRY = {
     "pinv": "pinv:Pinv",
     "dls": "dls:DLS",
+    "dls-manipulability": "dls_manipulability:DLSManipulability",
+    "dls-sigma": "dls_sigma:DLSSigma",
+    "numerical-filtering": "numerical_filtering:NumericalFilteringSolver",
+    "sdls": "sdls:SDLS",
+    "transpose": "transpose:Transpose",
+    "main-variables": "main_variables:MainVariables",
     "projected-gradient": "projected_gradient:ProjectedGradient",
+    "reduced-gradient": "reduced_gradient:ReducedGradient",
+    "extended-jacobian": "extended_jacobian:ExtendedJacobian",
     "task-priority": "task_priority:TaskPriority",
+    "singularity-robust-priority": "singularity_robust_priority:SingularityRobustPriority",
+    "reverse-priority": "reverse_priority:ReversePriority",
+    "task-scaling": "task_scaling:TaskScaling",
 }
 
 __all__ = [

@@ -18,20 +18,30 @@ import numpy as np
 from cartctl.algebra.metric import Whitening
 from cartctl.algebra.problem import Equation, Problem
 from cartctl.algebra.solution import Solution, Status
+from cartctl.algebra.svd import scale
 from cartctl.checks import FloatArray, is_finite
-from cartctl.errors import UnsupportedProblem
+from cartctl.errors import SolverOutputError, UnsupportedProblem
 
 
 class Solver(ABC):
     """Answers a Problem with a Solution, or refuses what it cannot honour (UnsupportedProblem)."""
 
     name: ClassVar[str]
+    takes_metric: ClassVar[bool] = True
+    stacks: ClassVar[bool] = False  # whether several equations are solved as one
+    extends: ClassVar[bool] = False  # whether the level shall add the rows that keep an objective extremal
     honours: ClassVar[frozenset[str]] = frozenset()  # of "reference", "bounds", "constraints"
 
     def solve(self, problem: Problem) -> Solution:
         """The answer to ``problem``; raises UnsupportedProblem, never returns NaN."""
         self.check(problem)
-        return self._solve_impl(problem)
+        solution = self._solve_impl(problem)
+        u = solution.u
+        if u.shape != (problem.n,) or not is_finite(u):
+            raise SolverOutputError(
+                f"solver {self.name!r} returned u of shape {np.shape(u)}: {u}; expected ({problem.n},) finite numbers"
+            )
+        return solution
 
     def prepare(self) -> None:
         """Do ahead what the first solve would otherwise wait for; nothing, unless a method has kernels to compile."""
@@ -46,6 +56,8 @@ class Solver(ABC):
             self._refuse("constraint rows", "constraints", "problem.without_bounds()")
         if problem.reference is not None and "reference" not in honours:
             self._refuse("a reference u0 for the null space", "reference", "problem.without_reference()")
+        if problem.metric is not None and not self.takes_metric:
+            raise UnsupportedProblem(f"solver {self.name!r} takes no metric; use another solver or metric=None")
 
     def _refuse(self, what: str, feature: str, remedy: str) -> None:
         from cartctl.solvers import solvers_that_honour
@@ -66,6 +78,9 @@ class Solver(ABC):
             return Status.SINGULAR
         if solution.met:
             return Status.OPTIMAL
+        problem = solution.problem
+        if self.stacks and len(problem.equations) > 1 and sum(problem.sizes) > problem.n:
+            return Status.OVERDETERMINED
         return Status.DAMPED if self.damps else Status.INEXACT
 
     @abstractmethod
@@ -78,6 +93,14 @@ class Answer(NamedTuple):
 
     u: FloatArray
     lost_rank: bool
+
+
+class System(NamedTuple):
+    """``A u = c`` in whitened coordinates; ratio: how much larger than ||A|| the equation is by nature, at least 1."""
+
+    A: FloatArray
+    c: FloatArray
+    ratio: float
 
 
 class EquationSolver(Solver):
@@ -94,29 +117,35 @@ class EquationSolver(Solver):
 
     def _whitened(self, problem: Problem) -> Answer:
         """The answer in the metric of the problem."""
-        systems = [(e.A, e.rhs) for e in problem.equations]
+        systems = [System(e.A, e.rhs, e.ratio) for e in problem.equations]
         u0 = problem.reference
         if problem.metric is None:
             return self._impl(systems, problem, u0)
         white = Whitening(problem.metric)
-        systems = [(white.matrix(A), c) for A, c in systems]
+        systems = [System(white.matrix(A), c, ratio) for A, c, ratio in systems]
         answer = self._impl(systems, problem, None if u0 is None else white.forward(u0))
         return Answer(white.back(answer.u), answer.lost_rank)
 
     @abstractmethod
-    def _impl(self, systems: list[tuple[FloatArray, FloatArray]], problem: Problem, u0: FloatArray | None) -> Answer:
+    def _impl(self, systems: list[System], problem: Problem, u0: FloatArray | None) -> Answer:
         """Minimise 1/2 ||u - u0||^2 over the answers to ``systems`` as this method sees them."""
 
 
-def stack(
-    systems: list[tuple[FloatArray, FloatArray]], equations: tuple[Equation, ...]
-) -> tuple[FloatArray, FloatArray]:
-    """All equations as one ``(A, c)``, rows weighed by the root of their weight; those of weight 0 left out."""
+def stack(systems: list[System], equations: tuple[Equation, ...]) -> System:
+    """All equations as one, rows weighed by the root of their weight; those of weight 0 left out.
+
+    c may be (m,) or (m, k), for k right-hand sides.
+    """
     if len(systems) == 1 and equations[0].weight == 1.0:
         return systems[0]
-    kept = [(e.weight**0.5, A, c) for e, (A, c) in zip(equations, systems, strict=True) if e.weight > 0.0]
+    kept = [(e.weight**0.5, system) for e, system in zip(equations, systems, strict=True) if e.weight > 0.0]
     if not kept:
-        return np.zeros((0, systems[0][0].shape[1])), np.zeros(0)
-    A = np.concatenate([root * A for root, A, _ in kept])
-    c = np.concatenate([root * c for root, _, c in kept])
-    return np.asfortranarray(A), c
+        first = systems[0]
+        return System(np.zeros((0, first.A.shape[1])), np.zeros((0, *first.c.shape[1:])), 1.0)
+    A = np.asfortranarray(np.concatenate([root * system.A for root, system in kept]))
+    c = np.concatenate([root * system.c for root, system in kept])
+    if all(system.ratio == 1.0 for _, system in kept):
+        return System(A, c, 1.0)
+    by_nature = max(root * system.ratio * scale(system.A) for root, system in kept)
+    norm = scale(A)
+    return System(A, c, max(1.0, by_nature / norm) if norm > 0.0 else 1.0)

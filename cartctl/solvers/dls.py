@@ -22,7 +22,7 @@ from cartctl.algebra.solution import Solution, Status
 from cartctl.algebra.svd import round_off, singular_values, svd
 from cartctl.checks import FloatArray
 from cartctl.kernels import kernel
-from cartctl.solvers.base import Answer, EquationSolver, stack
+from cartctl.solvers.base import Answer, EquationSolver, System, stack
 
 
 @dataclass(frozen=True)
@@ -32,6 +32,7 @@ class DLS(EquationSolver):
     damping: lambda > 0, in the units of the stacked matrix's singular values.
     """
 
+    stacks: ClassVar[bool] = True
     name: ClassVar[str] = "dls"
     honours: ClassVar[frozenset[str]] = frozenset({"reference"})
     damping: float = 1e-2
@@ -39,11 +40,11 @@ class DLS(EquationSolver):
     def __post_init__(self) -> None:
         object.__setattr__(self, "damping", checks.number("damping", self.damping, low=0.0, strict=True))
 
-    def _impl(self, systems: list[tuple[FloatArray, FloatArray]], problem: Problem, u0: FloatArray | None) -> Answer:
-        A, c = stack(systems, problem.equations)
+    def _impl(self, systems: list[System], problem: Problem, u0: FloatArray | None) -> Answer:
+        A, c, ratio = stack(systems, problem.equations)
         u = damped_solve(A, c, self.damping * self.damping)
         if u0 is not None:
-            u = u + null_part(svd(A), round_off(A), u0)
+            u = u + null_part(svd(A), ratio * round_off(A), u0)
         return Answer(u, False)
 
     def prepare(self) -> None:
@@ -59,10 +60,10 @@ class DLS(EquationSolver):
         """SINGULAR where damping outweighs a direction, sigma_min < lambda, or round-off does; asked only now."""
         problem = solution.problem
         white = None if problem.metric is None else Whitening(problem.metric)
-        systems = [(e.A if white is None else white.matrix(e.A), e.rhs) for e in problem.equations]
-        A, _ = stack(systems, problem.equations)
+        systems = [System(e.A if white is None else white.matrix(e.A), e.rhs, e.ratio) for e in problem.equations]
+        A, _, ratio = stack(systems, problem.equations)
         s = singular_values(A)
-        if s.shape[0] and s[-1] < max(self.damping, round_off(A)):
+        if s.shape[0] and s[-1] < max(self.damping, ratio * round_off(A)):
             return Status.SINGULAR
         return super().grade(solution)
 
@@ -136,5 +137,5 @@ def _by_filter(A: FloatArray, c: FloatArray, squared: float) -> FloatArray:
     decomposition = svd(A)
     s = decomposition.s
     k = s.shape[0]
-    phi = damped_factors(s, squared)
+    phi = damped_factors(s, squared, 0.0)
     return decomposition.Vt[:k].T @ (phi * (decomposition.U.T @ c))  # type: ignore[no-any-return]

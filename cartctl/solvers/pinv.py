@@ -13,7 +13,7 @@ from typing import ClassVar
 from cartctl.algebra.problem import Problem
 from cartctl.algebra.svd import scale, svd
 from cartctl.checks import FloatArray
-from cartctl.solvers.base import Answer, stack
+from cartctl.solvers.base import Answer, System, stack
 from cartctl.solvers.policy import PolicySolver
 
 
@@ -24,11 +24,12 @@ class Pinv(PolicySolver):
     policy: what becomes of small singular values.
     """
 
+    stacks: ClassVar[bool] = True
     name: ClassVar[str] = "pinv"
 
-    def _impl(self, systems: list[tuple[FloatArray, FloatArray]], problem: Problem, u0: FloatArray | None) -> Answer:
-        A, c = stack(systems, problem.equations)
+    def _impl(self, systems: list[System], problem: Problem, u0: FloatArray | None) -> Answer:
+        A, c, ratio = stack(systems, problem.equations)
         decomposition = svd(A)
-        size = scale(A)
+        size = ratio * scale(A)
         lost = self.policy.rank(decomposition.s, size) < min(A.shape)
         return Answer(self.policy.solve(decomposition, c, size), lost)

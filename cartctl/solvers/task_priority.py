@@ -12,10 +12,11 @@ from typing import ClassVar
 
 import numpy as np
 
+from cartctl.algebra.nullspace import NullSpace
 from cartctl.algebra.problem import Problem
-from cartctl.algebra.svd import numerical_rank, round_off, scale, svd
+from cartctl.algebra.svd import round_off, scale, svd
 from cartctl.checks import FloatArray
-from cartctl.solvers.base import Answer
+from cartctl.solvers.base import Answer, System
 from cartctl.solvers.policy import PolicySolver
 
 
@@ -29,24 +30,16 @@ class TaskPriority(PolicySolver):
     name: ClassVar[str] = "task-priority"
     honours: ClassVar[frozenset[str]] = frozenset({"reference"})
 
-    def _impl(self, systems: list[tuple[FloatArray, FloatArray]], problem: Problem, u0: FloatArray | None) -> Answer:
-        n = problem.n
-        u = np.zeros(n)
-        Z: FloatArray | None = None  # (n, r), None for the identity
+    def _impl(self, systems: list[System], problem: Problem, u0: FloatArray | None) -> Answer:
+        u = np.zeros(problem.n)
+        free = NullSpace(problem.n)
         lost_rank = False
-        for A, c in systems:
-            AZ = A if Z is None else np.asfortranarray(A @ Z)
-            free = AZ.shape[1]
-            if free == 0:
+        for A, c, ratio in systems:
+            if free.dimension == 0:
                 break
-            decomposition = svd(AZ)
-            size = scale(A)
-            step = self.policy.solve(decomposition, c - A @ u, size)
-            u = u + (step if Z is None else Z @ step)
-            lost_rank |= self.policy.rank(decomposition.s, size) < min(AZ.shape)
-            rest = decomposition.Vt[numerical_rank(decomposition.s, round_off(A)) :].T
-            Z = rest if Z is None else Z @ rest
-        if u0 is not None and (Z is None or Z.shape[1]):
-            rest_of_u0 = u0 - u if Z is None else Z @ (Z.T @ (u0 - u))
-            u = u + rest_of_u0
-        return Answer(u, lost_rank)
+            restricted = svd(free.restrict(A))
+            size = ratio * scale(A)
+            u = u + free.lift(self.policy.solve(restricted, c - A @ u, size))
+            lost_rank |= self.policy.rank(restricted.s, size) < min(A.shape[0], free.dimension)
+            free.narrow(restricted, ratio * round_off(A))
+        return Answer(u if u0 is None else u + free.project(u0 - u), lost_rank)

@@ -89,6 +89,10 @@ class Task(ABC):
     def jacobian(self, state: State) -> FloatArray:
         """``J`` (m, nv)."""
 
+    def size(self, state: State) -> float:
+        """The norm J has by nature, where it is a few rows of something larger; 0 where J speaks for itself."""
+        return 0.0
+
     @abstractmethod
     def drift(self, state: State) -> FloatArray:
         """``J_dot v`` (m,)."""

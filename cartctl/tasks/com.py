@@ -6,6 +6,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from cartctl.algebra.svd import scale
 from cartctl.checks import FloatArray
 from cartctl.model.robot import Robot
 from cartctl.model.state import State
@@ -49,6 +50,10 @@ class ComTask(Task):
     def jacobian(self, state: State) -> FloatArray:
         """``J_com`` (m, nv)."""
         return state.com_jacobian[self._index]  # type: ignore[no-any-return]
+
+    def size(self, state: State) -> float:
+        """The norm of all three rows."""
+        return scale(state.com_jacobian)
 
     def drift(self, state: State) -> FloatArray:
         """``J_com_dot v`` (m,)."""

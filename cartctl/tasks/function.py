@@ -82,6 +82,10 @@ class FunctionTask(Task):
             )
         return J
 
+    def size(self, state: State) -> float:
+        """Where J is differenced: the size whose 1e-10 is the noise of differencing, some 1e-11 (1 + |value|)."""
+        return 0.0 if self._jacobian is not None else 10.0 * (1.0 + float(np.linalg.norm(self.value(state))))
+
     def drift(self, state: State) -> FloatArray:
         """``J_dot v`` (m,)."""
         if self._drift is not None:

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from cartctl import checks
-from cartctl.algebra.svd import svd
+from cartctl.algebra.svd import scale, svd
 from cartctl.checks import FloatArray
 from cartctl.errors import CartctlWarning
 from cartctl.model.robot import Robot
@@ -113,6 +113,10 @@ class PoseTask(Task):
         if self._euler and self._angular:
             J = np.concatenate([J[:3], self._rates_inverse(state) @ J[3:]])
         return self._select(J)
+
+    def size(self, state: State) -> float:
+        """The norm of all six rows, where only some are controlled."""
+        return 0.0 if self._all else scale(self.pose_jacobian(state))
 
     def drift(self, state: State) -> FloatArray:
         """``J_dot v`` (m,); with Euler angles ``T^-1 (J_omega_dot v - T_dot phi_dot)`` in the angular rows."""

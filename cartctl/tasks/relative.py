@@ -6,6 +6,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from cartctl.algebra.svd import scale
 from cartctl.checks import FloatArray
 from cartctl.model.robot import Robot
 from cartctl.model.state import State
@@ -59,6 +60,10 @@ class RelativeFrameTask(PoseTask):
         Rt = state.rotation(self.reference_frame).T
         linear = Jf[:3] - Jr[:3] + skew(self._offset(state)) @ Jr[3:]
         return np.concatenate([Rt @ linear, Rt @ (Jf[3:] - Jr[3:])])
+
+    def size(self, state: State) -> float:
+        """The norm of both frames' Jacobians: what their difference may be the round-off of."""
+        return scale(state.jacobian(self._frame)) + scale(state.jacobian(self.reference_frame))
 
     def pose_drift(self, state: State) -> FloatArray:
         """``J_dot v`` (6,): the relative acceleration at zero joint acceleration, Coriolis terms included."""

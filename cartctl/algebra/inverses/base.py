@@ -15,6 +15,8 @@ import numpy as np
 from cartctl.algebra.svd import SVD
 from cartctl.checks import FloatArray
 
+NOISE = 1e-13  # singular values below this, relative to the task's own matrix, are round-off
+
 
 class InversePolicy(ABC):
     """A choice of filter factors phi(sigma), applied to one right-hand side.
@@ -42,7 +44,10 @@ class InversePolicy(ABC):
         return svd.Vt[:k].T @ (self.factors(svd.s, scale) * (svd.U.T @ b))  # type: ignore[no-any-return]
 
 
-def damped_factors(s: FloatArray, squared: FloatArray | float) -> FloatArray:
-    """``sigma / (sigma^2 + squared)``, (k,); 0 where both are."""
-    below = s * s + squared
-    return np.divide(s, below, out=np.zeros_like(s), where=below > 0.0)
+def damped_factors(s: FloatArray, squared: FloatArray | float, scale: float) -> FloatArray:
+    """``sigma / (sigma^2 + squared)``, (k,); 0 where sigma is round-off of a matrix of norm ``scale``."""
+    phi = np.zeros_like(s)
+    kept = s > NOISE * scale
+    with np.errstate(over="ignore"):
+        phi[kept] = 1.0 / (s + np.divide(squared, s, out=np.zeros_like(s), where=kept))[kept]  # s * s may overflow
+    return phi

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from cartctl import checks
-from cartctl.algebra.inverses.base import InversePolicy, damped_factors
+from cartctl.algebra.inverses.base import NOISE, InversePolicy, damped_factors
 from cartctl.algebra.svd import numerical_rank
 from cartctl.checks import FloatArray
 
@@ -25,8 +25,8 @@ class Damped(InversePolicy):
 
     def factors(self, s: FloatArray, scale: float) -> FloatArray:
         """phi(s); see the class."""
-        return damped_factors(s, self.damping**2)
+        return damped_factors(s, self.damping**2, scale)
 
     def rank(self, s: FloatArray, scale: float) -> int:
         """How many singular values lie above lambda, where damping takes less than half."""
-        return numerical_rank(s, self.damping)
+        return numerical_rank(s, max(self.damping, NOISE * scale))

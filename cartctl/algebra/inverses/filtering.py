@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cartctl import checks
-from cartctl.algebra.inverses.base import InversePolicy, damped_factors
+from cartctl.algebra.inverses.base import NOISE, InversePolicy, damped_factors
 from cartctl.checks import FloatArray
 
 
@@ -32,11 +32,11 @@ class NumericalFiltering(InversePolicy):
 
     def factors(self, s: FloatArray, scale: float) -> FloatArray:
         """phi(s); see the class."""
-        return damped_factors(s, self._squared(s))
+        return damped_factors(s, self._squared(s), scale)
 
     def rank(self, s: FloatArray, scale: float) -> int:
         """How many singular values outweigh their damping."""
-        return int((s * s > self._squared(s)).sum())
+        return int((s > np.maximum(np.sqrt(self._squared(s)), NOISE * scale)).sum())
 
     def _squared(self, s: FloatArray) -> FloatArray:
         shortfall = np.maximum(0.0, 1.0 - (s / self.threshold) ** 2)

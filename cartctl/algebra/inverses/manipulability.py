@@ -7,9 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from cartctl import checks
-from cartctl.algebra.inverses.base import InversePolicy, damped_factors
+from cartctl.algebra.inverses.base import NOISE, InversePolicy, damped_factors
 from cartctl.algebra.svd import numerical_rank
 from cartctl.checks import FloatArray
+
+
+def _product(s: FloatArray) -> float:
+    with np.errstate(over="ignore"):
+        return float(np.prod(s))
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,11 +34,11 @@ class ManipulabilityDamped(InversePolicy):
 
     def factors(self, s: FloatArray, scale: float) -> FloatArray:
         """phi(s); see the class."""
-        return damped_factors(s, self._damping(s) ** 2)
+        return damped_factors(s, self._damping(s) ** 2, scale)
 
     def rank(self, s: FloatArray, scale: float) -> int:
         """How many singular values outweigh the damping."""
-        return numerical_rank(s, self._damping(s))
+        return numerical_rank(s, max(self._damping(s), NOISE * scale))
 
     def _damping(self, s: FloatArray) -> float:
-        return self.damping * max(0.0, 1.0 - float(np.prod(s)) / self.threshold)
+        return self.damping * max(0.0, 1.0 - _product(s) / self.threshold)

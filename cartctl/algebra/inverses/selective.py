@@ -10,6 +10,7 @@ from cartctl import checks
 from cartctl.algebra.inverses.base import InversePolicy
 from cartctl.algebra.svd import SVD, numerical_rank
 from cartctl.checks import FloatArray
+from cartctl.kernels import kernel
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,24 +40,49 @@ class SelectivelyDamped(InversePolicy):
 
     def solve(self, svd: SVD, b: FloatArray, scale: float) -> FloatArray:
         """The clamped sum, (n,)."""
-        U, s, Vt = svd
-        k = s.shape[0]
-        n = Vt.shape[1]
-        rows = Vt[:k]
-        kept = s > self._floor(scale)
-        if not kept.any():
-            return np.zeros(n)
-        U, s, rows = U[:, kept], s[kept], rows[kept]
-        columns = np.sqrt(((s[:, None] * rows) ** 2).sum(axis=0))  # ||a_j||
-        reach = np.abs(rows) @ columns / s  # M_i >= 1
-        gamma = self.limit * np.minimum(1.0, 1.0 / reach)
-        steps = ((U.T @ b) / s)[:, None] * rows
-        largest = np.abs(steps).max(axis=1)
-        shortened = np.minimum(1.0, np.divide(gamma, largest, out=np.ones_like(gamma), where=largest > 0.0))
-        total = shortened @ steps
-        peak = float(np.abs(total).max())
-        return total if peak <= self.limit else total * (self.limit / peak)  # type: ignore[no-any-return]
+        y = np.empty(svd.Vt.shape[1])
+        clamped_sum.compiled(svd.U, svd.s, svd.Vt, b, self.limit, self._floor(scale), y)
+        return y
 
     @staticmethod
     def _floor(scale: float) -> float:
         return 1e-13 * scale
+
+
+@kernel("void(matrix, vector, matrix, vector, float, float, out_vector)")
+def clamped_sum(
+    U: FloatArray, s: FloatArray, Vt: FloatArray, b: FloatArray, limit: float, floor: float, y: FloatArray
+) -> None:
+    """Fill y (n,) with the clamped sum of :class:`SelectivelyDamped`; singular values below ``floor`` are left out."""
+    k, n = s.shape[0], Vt.shape[1]
+    columns = np.zeros(n)  # ||a_j|| / sigma_1, whose squares neither over- nor underflow
+    if k == 0 or not s[0] > floor:
+        y[:] = 0.0
+        return
+    for j in range(n):
+        y[j] = 0.0
+        total = 0.0
+        for i in range(k):
+            total += (s[i] / s[0] * Vt[i, j]) ** 2
+        columns[j] = np.sqrt(total)
+    for i in range(k):
+        if not s[i] > floor:
+            continue
+        reach, largest, along = 0.0, 0.0, 0.0
+        for j in range(n):
+            reach += abs(Vt[i, j]) * columns[j]
+            largest = max(largest, abs(Vt[i, j]))
+        for r in range(b.shape[0]):
+            along += U[r, i] * b[r]
+        along /= s[i]
+        gamma = limit * min(1.0, s[i] / s[0] / reach)
+        if abs(along) * largest > gamma:
+            along *= gamma / (abs(along) * largest)
+        for j in range(n):
+            y[j] += along * Vt[i, j]
+    peak = 0.0
+    for j in range(n):
+        peak = max(peak, abs(y[j]))
+    if peak > limit:
+        for j in range(n):
+            y[j] *= limit / peak

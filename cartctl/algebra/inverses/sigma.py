@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cartctl import checks
-from cartctl.algebra.inverses.base import InversePolicy, damped_factors
+from cartctl.algebra.inverses.base import NOISE, InversePolicy, damped_factors
 from cartctl.algebra.svd import numerical_rank
 from cartctl.checks import FloatArray
 
@@ -28,11 +28,11 @@ class SigmaDamped(InversePolicy):
 
     def factors(self, s: FloatArray, scale: float) -> FloatArray:
         """phi(s); see the class."""
-        return damped_factors(s, self._squared(s))
+        return damped_factors(s, self._squared(s), scale)
 
     def rank(self, s: FloatArray, scale: float) -> int:
         """How many singular values outweigh the damping."""
-        return numerical_rank(s, float(np.sqrt(self._squared(s))))
+        return numerical_rank(s, max(float(np.sqrt(self._squared(s))), NOISE * scale))
 
     def _squared(self, s: FloatArray) -> float:
         ratio = float(s[-1]) / self.threshold if s.shape[0] else 1.0

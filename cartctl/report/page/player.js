@@ -16,13 +16,44 @@
   }
   el("scene").remove();
 
+  // A copy of a robot borrows its shapes from the first one: sent once, kept once.
+  const shapes = new Map(), copies = [];
+  viewer.scene.traverse((object) => {
+    if (!object.geometry) return;
+    if (object.geometry.userData.borrows) copies.push(object);
+    else shapes.set(object.geometry.uuid, object.geometry);
+  });
+  for (const copy of copies) copy.geometry = shapes.get(copy.geometry.userData.borrows);
+
+  // The picture has the room that the table below leaves.
+  const view = el("view"), resize = viewer.set_3d_pane_size.bind(viewer);
+  viewer.set_3d_pane_size = () => resize(view.clientWidth, view.clientHeight);
+
   // The scene was framed for windows wider than scene.aspect; a narrower one zooms out by as much.
   const fit = () => {
-    viewer.camera.zoom = Math.min(1, innerWidth / innerHeight / scene.aspect);
-    viewer.set_dirty();
+    viewer.camera.zoom = Math.min(1, view.clientWidth / view.clientHeight / scene.aspect);
+    viewer.set_3d_pane_size();
   };
   addEventListener("resize", fit);
   fit();
+
+  // One switch a run, and one for all.
+  const switches = [...document.querySelectorAll("[data-run]")], all = el("all");
+  const toggle = () => {
+    for (const box of switches) viewer.set_property(["meshcat", "run" + box.dataset.run], "visible", box.checked);
+    const on = switches.filter((box) => box.checked).length;
+    if (all) {
+      all.checked = on > 0;
+      all.indeterminate = on > 0 && on < switches.length;
+    }
+    viewer.set_dirty();
+  };
+  for (const box of switches) box.addEventListener("change", toggle);
+  if (all) all.addEventListener("change", () => {
+    for (const box of switches) box.checked = all.checked;
+    toggle();
+  });
+  if (all) toggle();
 
   const animator = viewer.animator;
   const duration = animator.duration;

@@ -1,0 +1,64 @@
+"""What the micro-benchmarks share: interleaved rounds, tables, results with date and versions."""
+
+from __future__ import annotations
+
+import csv
+import os
+import platform
+from collections.abc import Callable
+from datetime import date
+from importlib.metadata import version
+from pathlib import Path
+from time import perf_counter_ns
+
+from rich.console import Console
+from rich.table import Table
+
+ROUNDS, CALLS = 60, 300
+
+
+def interleaved(
+    functions: dict[str, Callable[[], object]], rounds: int = ROUNDS, calls: int = CALLS
+) -> dict[str, list[float]]:
+    """Us a call, one figure a round; all functions take their turn in every round."""
+    times: dict[str, list[float]] = {name: [] for name in functions}
+    for function in functions.values():
+        for _ in range(50):  # compile and warm up
+            function()
+    for _ in range(rounds):
+        for name, function in functions.items():
+            start = perf_counter_ns()
+            for _ in range(calls):
+                function()
+            times[name].append((perf_counter_ns() - start) / calls / 1e3)
+    return times
+
+
+def setting() -> dict[str, str]:
+    """Date, machine and versions."""
+    return {
+        "date": date.today().isoformat(),
+        "machine": f"{platform.machine()}, {os.cpu_count()} cores",
+        "python": platform.python_version(),
+        **{name: version(name) for name in ("cartctl", "pin", "numpy", "scipy", "numba")},
+    }
+
+
+def show(title: str, rows: list[dict[str, str]]) -> None:
+    """Print the rows as a table, and the setting below."""
+    table = Table(*(key.replace("_", " ") for key in rows[0]), title=title)
+    for row in rows:
+        table.add_row(*row.values())
+    console = Console()
+    console.print(table)
+    console.print(", ".join(f"{k} {v}" for k, v in setting().items()), style="dim")
+
+
+def save_rows(path: Path, rows: list[dict[str, str]], extra: dict[str, str]) -> None:
+    """Write the rows as CSV, each with the setting."""
+    path.parent.mkdir(exist_ok=True)
+    with path.open("w", newline="") as file:
+        writer = csv.DictWriter(file, [*rows[0], *extra])
+        writer.writeheader()
+        writer.writerows({**row, **extra} for row in rows)
+    Console().print(f"written: {path.name}")

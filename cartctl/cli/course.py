@@ -1,0 +1,104 @@
+"""What a hand shall do, whatever the method: a robot, a frame of it, the axes that count, a path, a time."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path as FilePath
+
+import cartctl as cc
+from cartctl import checks
+from cartctl.cli.choices import posture
+from cartctl.cli.console import say
+from cartctl.cli.hand import Hand
+from cartctl.cli.method import limit_options
+from cartctl.cli.shapes import Shape
+
+_SETTLE = 0.5  # s after the path's end
+_SOFT_START = 0.5  # s in which the objective rises, so that the rates do not jump
+
+
+@dataclass(frozen=True)
+class Place:
+    """The options that name a hand: of which robot, from where, which frame and axes of it."""
+
+    robot: str
+    package_dirs: Sequence[FilePath] | None
+    root_joint: str | None
+    home: Sequence[str] | None
+    frame: str | None
+    axes: str | None
+
+
+@dataclass(frozen=True)
+class Way:
+    """The options that name a path."""
+
+    kind: str
+    plane: str | None
+    size: float | None
+    period: float
+    laps: int
+
+
+@dataclass(frozen=True)
+class Pace:
+    """The options that tell how it is followed: gain in 1/s, step in s, duration in s."""
+
+    level: str
+    gain: float
+    dt: float
+    duration: float | None
+
+
+class Course:
+    """A robot's hand, the path it shall follow, and for how long.
+
+    Raises what :func:`cartctl.load`, the hand and the paths raise.
+    """
+
+    def __init__(self, place: Place, way: Way, pace: Pace) -> None:
+        self.robot = cc.load(
+            place.robot,
+            package_dirs=place.package_dirs or (),
+            root_joint=place.root_joint,
+            home=posture(place.home or ()),
+        )
+        self.hand = Hand(self.robot, self.robot.tool if place.frame is None else place.frame)
+        self.axes = self.hand.axes if place.axes is None else place.axes
+        self.shape = Shape.fitting(self.hand, self.axes, way.kind, way.plane, way.size, way.period, way.laps)
+        self._chosen = place.axes is None and self.axes != "pose"
+        self._pace = pace
+        target = self.shape.path(self.hand)
+        self.task = cc.FrameTask(self.hand.frame, axes=self.axes, gain=pace.gain, target=target)
+        end = pace.duration
+        self.end = target.duration + _SETTLE if end is None else checks.number("--duration", end, low=pace.dt)
+
+    def controller(self, solver: cc.Solver, objective: cc.Objective | None) -> cc.Controller:
+        """The loop that follows it; raises as :class:`cartctl.Controller`."""
+        pace = self._pace
+        return cc.Controller(
+            self.robot, self.task, solver, pace.level, objective=objective, dt=pace.dt,
+            soft_start=_SOFT_START, **limit_options(solver, pace.level),
+        )  # fmt: skip
+
+    def facts(self) -> list[tuple[str, str]]:
+        """What it is, defaults included."""
+        robot = self.robot
+        spare = max(robot.nv - len(self.task.units(robot)), 0)
+        found = " (where this robot can move)" if self._chosen else ""
+        return [
+            ("robot", f"{robot.name}, {robot.nv} degrees of freedom, {spare} redundant"),
+            ("hand", f"{self.hand.frame}, axes {self.axes}{found}"),
+            ("path", f"{self.shape}, {self.end:g} s in all"),
+        ]
+
+    def pace(self) -> str:
+        """Level, gain and step."""
+        return f"{self._pace.level} level, gain {self.task.gain:g} 1/s, step {1e3 * self._pace.dt:g} ms"
+
+    def warn(self) -> None:
+        """Say it where home is singular."""
+        if self.hand.is_singular(self.axes):
+            advice = "start elsewhere with --home JOINT=VALUE, or damp with --solver dls"
+            say("warning", f"home is singular for axes {self.axes}; {advice}", "bold yellow")

@@ -1,0 +1,101 @@
+"""Putting a page together: meshcat's own viewer, inlined, and the commands a meshcat server would have sent it.
+
+A content security policy forbids every request and every script but the two written here, so that nothing in a
+robot's description can do more than be shown.
+"""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from html import escape
+from importlib.metadata import PackageNotFoundError, version
+from importlib.resources import files
+from string import Template
+from typing import TYPE_CHECKING
+
+from cartctl.report.palette import COLORS
+from cartctl.report.recorder import Recorder
+from cartctl.report.scene import Scene
+
+if TYPE_CHECKING:
+    from cartctl.motion.run import Run
+
+
+@dataclass(frozen=True)
+class Words:
+    """What stands around the picture: text, but for ``heading``, ``caption`` and ``below``, which are HTML.
+
+    traced: what the legend says of the paths that were made, "" to say nothing.
+    """
+
+    title: str
+    heading: str
+    subtitle: str
+    caption: str = ""
+    below: str = ""
+    traced: str = "actual path"
+
+
+def assemble(runs: Sequence[Run], words: Words, colors: Sequence[str] = COLORS[:1]) -> str:
+    """Return the page that shows ``runs``, the paths and ghosts of each in its colour."""
+    recorder = Recorder()
+    scene = Scene(runs, recorder.visualizer(), colors)
+    scene.draw()
+    commands = [base64.b64encode(command).decode("ascii") for command in recorder.commands]
+    data = json.dumps({"aspect": scene.stage.view.aspect, "commands": commands})
+    viewer, player = _viewer("main.min.js"), _own("player.js")
+    for script in (data, viewer, player):
+        assert "</script" not in script.lower()  # numbers, base64, and two known files
+    return Template(_own("page.html")).substitute(
+        policy=_policy(viewer, player), version=escape(_version()), style=_own("page.css"),
+        title=escape(words.title), heading=words.heading, subtitle=escape(words.subtitle),
+        caption=words.caption + (_legend(words.traced) if scene.records else ""), below=words.below,
+        kind="several" if len(runs) > 1 else "single",
+        scene=data, viewer=viewer, player=player, licences=escape(_licences()),
+    )  # fmt: skip
+
+
+def breakable(name: str) -> str:
+    """Return a name from a URDF as HTML that may break after its underscores."""
+    return escape(name).replace("_", "_<wbr>")
+
+
+def _legend(traced: str) -> str:
+    """Return the key to what is drawn beside the robot."""
+    entries = [("dot desired", "target"), ("desired", "desired path")] + [("traced", traced)] * bool(traced)
+    return "<ul>" + "".join(f'<li class="{kind}">{escape(text)}</li>' for kind, text in entries) + "</ul>"
+
+
+def _policy(*scripts: str) -> str:
+    """Return the content security policy: these very scripts, inline styles, embedded images, nothing else."""
+    hashes = (base64.b64encode(hashlib.sha256(s.encode()).digest()).decode() for s in scripts)
+    sources = " ".join(f"'sha256-{digest}'" for digest in hashes)
+    return f"default-src 'none'; script-src {sources}; style-src 'unsafe-inline'; img-src data: blob:"
+
+
+def _viewer(name: str) -> str:
+    """Return a file of meshcat's bundled viewer."""
+    return (files("meshcat") / "viewer" / "dist" / name).read_text(encoding="utf-8")
+
+
+def _licences() -> str:
+    """Return the terms under which the viewer, and what it was built from, may be passed on."""
+    listed = json.loads(_viewer("main.min.js.THIRD_PARTY_LICENSES.json"))
+    texts = [f"{entry['name']} {entry['version']}\n\n{entry['licenseText']}" for entry in listed]
+    own = (files("meshcat") / "viewer" / "LICENSE").read_text(encoding="utf-8")
+    return "\n\n".join([f"meshcat\n\n{own}", _viewer("main.min.js.LICENSE.txt"), *texts])
+
+
+def _own(name: str) -> str:
+    return (files("cartctl.report") / "page" / name).read_text(encoding="utf-8")
+
+
+def _version() -> str:
+    try:
+        return version("cartctl")
+    except PackageNotFoundError:  # run from a source tree that was never installed
+        return ""
