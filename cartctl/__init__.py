@@ -158,7 +158,18 @@ def __getattr__(name: str) -> Any:
         return import_module("cartctl.analysis")
     if name not in _HOME_OF:
         raise AttributeError(f"module 'cartctl' has no attribute {name!r}")
-    value = import_module("cartctl.solvers") if name == "solvers" else getattr(import_module(_HOME_OF[name]), name)
+    try:
+        module = import_module(_HOME_OF[name])
+    except ModuleNotFoundError as error:
+        if error.name is None or error.name.startswith("cartctl"):
+            raise
+        from cartctl.errors import MissingDependencyError
+
+        package = {"pinocchio": "pin", "umsgpack": "u-msgpack-python"}.get(error.name, error.name)
+        raise MissingDependencyError(
+            f"cc.{name} needs {error.name}, which is missing: pip install {package} (`cartctl doctor` checks the rest)"
+        ) from None
+    value = module if name == "solvers" else getattr(module, name)
     globals()[name] = value
     return value
 

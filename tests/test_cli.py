@@ -188,7 +188,9 @@ def test_a_path_out_of_reach_ends_properly(arm: str, plain: None, solver: str) -
 def test_a_singular_home_is_said(arm: str, plain: None) -> None:
     result = cartctl("track", arm, *QUICK, "--home", "elbow=0", "--home", "wrist=0", "--solver", "dls")
     assert result.exit_code == 0
-    assert result.stderr.startswith("warning: home is singular for axes xy") and result.stderr.count("\n") == 1
+    lines = result.stderr.splitlines()
+    assert len(lines) == 2 and lines[0] == "warning: home is outside the limits of elbow"
+    assert lines[1].startswith("warning: home is singular for axes xy")
     singular = cc.Run.load("out/three-circle-dls.npz").status.count("SINGULAR")
     assert singular and f"SINGULAR {singular}" in result.stdout
     assert "SINGULAR: A task lost rank here" in result.stdout
@@ -287,7 +289,7 @@ def test_a_singular_home_does_not_hide_an_axis(arm: str) -> None:
 
 
 def test_a_frame_that_nothing_moves_is_refused(arm: str) -> None:
-    with pytest.raises(ParameterError, match="moves frame 'base'"):
+    with pytest.raises(ParameterError, match="moves the origin of frame 'base'"):
         _ = hand.Hand(cc.load(arm), "base").axes
     assert "'base'" in the_error(cartctl("track", arm, "--frame", "base"))
 
@@ -701,3 +703,8 @@ def test_a_reader_that_leaves_early_is_no_drama() -> None:
 )  # fmt: skip
 def test_numbers_stay_short(value: float | None, text: str) -> None:
     assert number(value) == text
+
+
+def test_axes_that_no_path_moves_are_refused(arm: str, plain: None) -> None:
+    result = cartctl("track", arm, *QUICK, "--axes", "rz")
+    assert result.exit_code == 2 and "holds no position" in result.stderr

@@ -76,3 +76,15 @@ def test_the_package_of_solvers_and_their_list_share_a_name(first: str) -> None:
     code += "cc.solvers.solve, cc.solvers()"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert "'dls'" in done.stdout
+
+
+def test_a_missing_package_is_named_with_the_command_that_installs_it() -> None:
+    code = (
+        "import sys; sys.modules['pinocchio'] = None\n"
+        "import cartctl as cc\n"
+        "cc.solve, cc.Problem\n"
+        "try: cc.load\n"
+        "except cc.CartctlError as error: print(type(error).__name__, error)\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert "MissingDependencyError" in done.stdout and "pip install pin" in done.stdout

@@ -13,12 +13,12 @@ import pinocchio as pin
 import pytest
 
 from cartctl.errors import CartctlWarning
+from cartctl.report.actor import spaced
 from cartctl.report.bodies import TRIANGLES, bodies, surface
 from cartctl.report.camera import ASPECT, FOV, view
 from cartctl.report.html import page
 from cartctl.report.mesh import weld
 from cartctl.report.recorder import Recorder
-from cartctl.report.actor import spaced
 from cartctl.report.shapes import lathe, sphere
 from cartctl.report.timeline import FRAMES, frames
 from tests.report_runs import planar_run

@@ -13,6 +13,8 @@ from cartctl.cli.console import say
 from cartctl.cli.hand import Hand
 from cartctl.cli.method import limit_options
 from cartctl.cli.shapes import Shape
+from cartctl.errors import ParameterError
+from cartctl.tasks.axes import pose_rows
 
 _SETTLE = 0.5  # s after the path's end
 _SOFT_START = 0.5  # s in which the objective rises, so that the rates do not jump
@@ -66,6 +68,10 @@ class Course:
         )
         self.hand = Hand(self.robot, self.robot.tool if place.frame is None else place.frame)
         self.axes = self.hand.axes if place.axes is None else place.axes
+        if all(row >= 3 for row in pose_rows(self.axes)):
+            raise ParameterError(
+                f"--axes is {self.axes!r}, which holds no position, so no path moves it; add x, y or z"
+            )
         self.shape = Shape.fitting(self.hand, self.axes, way.kind, way.plane, way.size, way.period, way.laps)
         self._chosen = place.axes is None and self.axes != "pose"
         self._pace = pace
@@ -85,10 +91,9 @@ class Course:
     def facts(self) -> list[tuple[str, str]]:
         """What it is, defaults included."""
         robot = self.robot
-        spare = max(robot.nv - len(self.task.units(robot)), 0)
         found = " (where this robot can move)" if self._chosen else ""
         return [
-            ("robot", f"{robot.name}, {robot.nv} degrees of freedom, {spare} redundant"),
+            ("robot", f"{robot.name}, {robot.nv} degrees of freedom, {self.spare} redundant"),
             ("hand", f"{self.hand.frame}, axes {self.axes}{found}"),
             ("path", f"{self.shape}, {self.end:g} s in all"),
         ]
@@ -97,8 +102,19 @@ class Course:
         """Level, gain and step."""
         return f"{self._pace.level} level, gain {self.task.gain:g} 1/s, step {1e3 * self._pace.dt:g} ms"
 
+    @property
+    def spare(self) -> int:
+        """Degrees of redundancy: joints less rows of the task."""
+        return max(self.robot.nv - len(self.task.units(self.robot)), 0)
+
     def warn(self) -> None:
-        """Say it where home is singular."""
+        """Say it where home is singular, or outside the robot's limits."""
+        robot, limits = self.robot, self.robot.limits
+        at = robot.coordinates(robot.home)
+        outside = (at < limits.position_lower) | (at > limits.position_upper)
+        if outside.any():
+            names = ", ".join(name for name, out in zip(robot.dof_names, outside, strict=True) if out)
+            say("warning", f"home is outside the limits of {names}", "bold yellow")
         if self.hand.is_singular(self.axes):
             advice = "start elsewhere with --home JOINT=VALUE, or damp with --solver dls"
             say("warning", f"home is singular for axes {self.axes}; {advice}", "bold yellow")

@@ -53,7 +53,9 @@ class Hand:
             return "pose"
         rank = _rank(J[:, :3])
         if rank == 0:
-            raise ParameterError(f"no joint of {self.robot.name!r} moves frame {self.frame!r}; choose another --frame")
+            raise ParameterError(
+                f"no joint of {self.robot.name!r} moves the origin of frame {self.frame!r}; choose another --frame"
+            )
         best = max(combinations(range(3), rank), key=lambda rows: float(_svd(J[:, rows])[:, -1].max()))
         return "position" if rank == 3 else "".join(LETTERS[row] for row in best)
 

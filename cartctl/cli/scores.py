@@ -85,7 +85,7 @@ def _whole(metrics: Metrics) -> Table:
     rows: list[tuple[str, RenderableType]] = []
     if metrics.path_drift is not None:
         drift = number(metrics.path_drift)
-        rows.append(("drift over a lap", f"{drift} (distance of the joints between its start and end)"))
+        rows.append(("drift over a lap", f"{drift} rad or m (distance of the joints between its start and end)"))
     sigma = min(task.min_singular_value for task in metrics.tasks)
     rows.append(("singular value", f"{number(sigma)} at the least"))
     scale = min(task.min_scale for task in metrics.tasks)

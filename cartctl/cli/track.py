@@ -60,7 +60,9 @@ def track(
         controller = course.controller(how, purpose.objective)
         place = files.Files(out_dir, course.robot.name, path, how.name)
     console = out()
-    console.print(_plan(course, controller, purpose.words))
+    idle = purpose.objective is not None and not course.spare
+    words = f"{purpose.words}; no joint to spare, so it has no effect" if idle else purpose.words
+    console.print(_plan(course, controller, words))
     course.warn()
     run = _rollout(controller, course.end)
     if not len(run.time):

@@ -116,11 +116,20 @@ class Robot:
         """``q`` as a read-only (nq,) copy, checked; raises ShapeError, NonFiniteError, ConfigurationError."""
         checked = checks.vector(name, q, self.nq, largest=checks.LARGEST)
         if not self.is_on_manifold(checked):
-            raise ConfigurationError(
-                f"{name} holds a quaternion or a (cos, sin) pair without unit norm; "
-                "expected pin.normalize(robot.model, q)"
-            )
+            raise ConfigurationError(self._off_manifold(checked, name))
         return checked
+
+    def _off_manifold(self, q: FloatArray, name: str) -> str:
+        """Which joint's numbers are no rotation."""
+        bad = "a joint has numbers that are no rotation"
+        for joint_name, joint in self._joints.items():
+            count = {0: 0, 1: 4 if joint.nv == 6 else 2}[joint.nq - joint.nv]
+            end = joint.idx_q + joint.nq
+            norm = float(np.linalg.norm(q[end - count : end])) if count else 1.0
+            if abs(norm - 1.0) > _UNIT:
+                what = "quaternion" if joint.nv == 6 else "(cos, sin) pair"
+                bad = f"the {what} of joint {joint_name!r} has norm {norm:.6g}"
+        return f"{name}: {bad}; expected norm 1, as pin.normalize(robot.model, q)"
 
     def is_on_manifold(self, q: FloatArray) -> bool:
         """Whether all quaternions and (cos, sin) pairs in q have unit norm."""

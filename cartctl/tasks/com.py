@@ -41,7 +41,7 @@ class ComTask(Task):
 
     def take_target(self, value: Any, label: str) -> None:
         """A point (3,), a path, or None."""
-        self._point, self._path = point_target(value, label, 3)
+        self._point, self._path = point_target(value, label, 3, in_space=True)
 
     def units(self, robot: Robot) -> list[str]:
         """M."""

@@ -11,6 +11,7 @@ import pinocchio as pin
 from cartctl import checks
 from cartctl.checks import FloatArray
 from cartctl.errors import TargetError
+from cartctl.paths import Path
 
 _ORTHONORMAL = 1e-6
 
@@ -62,8 +63,16 @@ class PointTarget(NamedTuple):
     path: Callable[[float], Any] | None
 
 
-def point_target(value: Any, name: str, size: int | None = None) -> PointTarget:
-    """``value`` as a (size,) array, a path or None; raises TargetError, NonFiniteError."""
+def point_target(value: Any, name: str, size: int | None = None, *, in_space: bool = False) -> PointTarget:
+    """``value`` as a (size,) array, a path or None; raises TargetError, NonFiniteError.
+
+    in_space: whether a path may be one of :mod:`cartctl.paths`, which move in the world.
+    """
+    if isinstance(value, Path) and not in_space:
+        raise TargetError(
+            f"{name} is a {type(value).__name__}, a path in the world; "
+            "expected t -> (value, rate, acceleration), each (m,)"
+        )
     if value is None or callable(value):
         return PointTarget(None, value)
     if np.ndim(value) == 0:
