@@ -56,10 +56,17 @@ def rates(solver, *equations, **more):
     return solve(Problem(list(equations), **more), solver).u
 
 
-@pytest.mark.parametrize("identifier", ITEMS)
+def pytest_generate_tests(metafunc):
+    if "identifier" in metafunc.fixturenames:
+        metafunc.parametrize("identifier", ANSWERS)
+
+
 def test_worked_example(identifier):
-    item = ITEMS[identifier]
-    computed = ANSWERS[identifier](item["inputs"])
+    compare(ITEMS[identifier], ANSWERS[identifier](ITEMS[identifier]["inputs"]))
+
+
+def compare(item, computed):
+    """The checked keys, each to the digits it was printed with."""
     assert set(item["checked_keys"]) <= set(computed)
     for key in item["checked_keys"]:
         tolerance = item["tolerance"]
@@ -70,7 +77,7 @@ def test_worked_example(identifier):
 
 
 def test_every_answer_has_its_item():
-    assert set(ANSWERS) == set(ITEMS)
+    assert set(ANSWERS) <= set(ITEMS)  # the others are answered in test_worked_examples_2.py
 
 
 # ---------------------------------------------------------------- pseudo-inverse and damping

@@ -37,9 +37,12 @@ class NullSpace:
         """``A Z``, (m, dimension): what a task can still do."""
         return A if self._basis is None else np.asfortranarray(A @ self._basis)
 
-    def lift(self, y: FloatArray) -> FloatArray:
-        """``Z y``, (n,)."""
-        return y if self._basis is None else self._basis @ y
+    def lift(self, restricted: SVD) -> SVD:
+        """The SVD of ``A Z Z^T`` from that of ``A Z``: right singular vectors in joint space, (k, n) of them."""
+        if self._basis is None:
+            return restricted
+        k = restricted.s.shape[0]
+        return SVD(restricted.U, restricted.s, restricted.Vt[:k] @ self._basis.T)
 
     def project(self, u: FloatArray) -> FloatArray:
         """``Z Z^T u``, (n,)."""

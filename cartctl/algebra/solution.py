@@ -24,7 +24,10 @@ class Status(Enum):
         "More rows are stacked than there are unknowns, so the added tasks disturb the first; "
         "add at most n - m rows, or rank the tasks with task-priority."
     )
-    INFEASIBLE = "No scale of the commands keeps the bounds; u is the answer without commands, clipped into the box."
+    INFEASIBLE = (
+        "No scale of the commands keeps the bounds; u is the answer without commands, clipped into the box; "
+        "bound_violation() says by how much constraint rows are missed."
+    )
     SINGULAR = (
         "A task lost rank here: motion in the lost directions is left out or damped; "
         "move away from the singularity or drop an axis."
@@ -44,6 +47,9 @@ class Method(Protocol):
     def grade(self, solution: Solution) -> Status:
         """How the answer went."""
 
+    def task_part(self, solution: Solution) -> FloatArray:
+        """What of the answer the tasks ask for."""
+
 
 class Solution:
     """The answer of one solver to one problem.
@@ -57,6 +63,7 @@ class Solution:
         "_method",
         "_residuals",
         "_saturated",
+        "_saturated_rows",
         "_scales",
         "_status",
         "_task_part",
@@ -76,6 +83,7 @@ class Solution:
         lost_rank: bool = False,
         scales: FloatArray | None = None,
         saturated: NDArray[np.int8] | None = None,
+        saturated_rows: NDArray[np.int8] | None = None,
     ) -> None:
         self.problem = problem
         self.u = u
@@ -85,6 +93,7 @@ class Solution:
         self._status = status
         self._scales = scales
         self._saturated = saturated
+        self._saturated_rows = saturated_rows
         self._residuals: FloatArray | None = None
         self._task_part: FloatArray | None = None
 
@@ -114,6 +123,8 @@ class Solution:
     @property
     def saturated_rows(self) -> NDArray[np.int8]:
         """(r,) the same for the rows of the constraints."""
+        if self._saturated_rows is not None:
+            return self._saturated_rows
         rows = 0 if self.problem.constraints is None else self.problem.constraints[0].shape[0]
         return np.zeros(rows, dtype=np.int8)
 
@@ -133,12 +144,12 @@ class Solution:
 
     @property
     def task_part(self) -> FloatArray:
-        """(n,) what the tasks ask for: the answer of the same method with u0 = 0."""
+        """(n,) what the tasks ask for: the answer of the same method, at the same scales, with u0 = 0."""
         if self._task_part is None:
             if self.problem.reference is None or self._method is None:
                 self._task_part = self.u
             else:
-                self._task_part = self._method.solve(self.problem.without_reference()).u
+                self._task_part = self._method.task_part(self)
         return self._task_part
 
     @property

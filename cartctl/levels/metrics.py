@@ -11,6 +11,7 @@ import numpy as np
 from cartctl import checks
 from cartctl.algebra.metric import as_metric
 from cartctl.checks import FloatArray
+from cartctl.errors import ParameterError
 from cartctl.model.limits import Limits
 from cartctl.model.state import State
 
@@ -36,6 +37,8 @@ class JointLimitMetric:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "gain", checks.number("gain", self.gain, low=0.0))
+        if self.limits is not None and not isinstance(self.limits, Limits):
+            raise ParameterError(f"limits is a {type(self.limits).__name__}; expected Limits such as robot.limits")
 
     def __call__(self, state: State) -> FloatArray:
         """The weights at ``state``, (nv,)."""

@@ -38,7 +38,7 @@ def onto_extremal_set(robot: Robot, tasks: Sequence[Task], objective: Objective,
     for _ in range(_STEPS):
         rows = extremal_rows(state, held, objective, scratch)
         error = np.concatenate([t.reference(state, 0.0, a).error for t, a in zip(held, anchors, strict=True)])
-        if norm(rows.slope) <= _DONE * (1e-3 + norm(objective.gradient(state))) and norm(error) <= 1e-10:
+        if norm(rows.slope) <= _DONE * (scale(rows.A) + norm(objective.gradient(state))) and norm(error) <= 1e-10:
             return q
         step = _step(rows, np.concatenate([task.jacobian(state) for task in held]), error, objective.maximise)
         length = norm(step)
@@ -58,5 +58,7 @@ def _step(rows: ExtremalRows, J: FloatArray, error: FloatArray, maximise: bool) 
     sign = -1.0 if maximise else 1.0
     good = curvature.size == 0 or float(np.linalg.eigvalsh(sign * 0.5 * (curvature + curvature.T))[0]) > 0.0
     added = (rows.A, -rows.slope) if good else (rows.basis.T, -sign * 0.5 * _LONGEST * rows.slope / norm(rows.slope))
-    A = np.asfortranarray(np.concatenate([J, added[0]]))
-    return Truncated().solve(svd(A), np.concatenate([error, added[1]]), scale(A))
+    size = scale(added[0])
+    unit = scale(J) / size if size > 0.0 else 1.0  # H has its own unit
+    A = np.asfortranarray(np.concatenate([J, unit * added[0]]))
+    return Truncated().solve(svd(A), np.concatenate([error, unit * added[1]]), scale(A))

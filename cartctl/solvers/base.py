@@ -27,7 +27,6 @@ class Solver(ABC):
     """Answers a Problem with a Solution, or refuses what it cannot honour (UnsupportedProblem)."""
 
     name: ClassVar[str]
-    takes_metric: ClassVar[bool] = True
     stacks: ClassVar[bool] = False  # whether several equations are solved as one
     extends: ClassVar[bool] = False  # whether the level shall add the rows that keep an objective extremal
     honours: ClassVar[frozenset[str]] = frozenset()  # of "reference", "bounds", "constraints"
@@ -42,6 +41,11 @@ class Solver(ABC):
                 f"solver {self.name!r} returned u of shape {np.shape(u)}: {u}; expected ({problem.n},) finite numbers"
             )
         return solution
+
+    @property
+    def takes_metric(self) -> bool:
+        """Whether the method means something in a metric other than the identity."""
+        return True
 
     def prepare(self) -> None:
         """Do ahead what the first solve would otherwise wait for; nothing, unless a method has kernels to compile."""
@@ -82,6 +86,10 @@ class Solver(ABC):
         if self.stacks and len(problem.equations) > 1 and sum(problem.sizes) > problem.n:
             return Status.OVERDETERMINED
         return Status.DAMPED if self.damps else Status.INEXACT
+
+    def task_part(self, solution: Solution) -> FloatArray:
+        """What of an answer the tasks ask for, (n,): the answer with u0 = 0."""
+        return self.solve(solution.problem.without_reference()).u
 
     @abstractmethod
     def _solve_impl(self, problem: Problem) -> Solution:

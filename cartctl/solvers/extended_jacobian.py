@@ -37,10 +37,15 @@ class ExtendedJacobian(PolicySolver):
         super().__post_init__()
         object.__setattr__(self, "gain", checks.number("gain", self.gain, low=0.0, strict=True))
 
+    @property
+    def takes_metric(self) -> bool:
+        """No: a square solve leaves nothing to weigh."""
+        return False
+
     def check(self, problem: Problem) -> None:
         """Refuse fewer rows than unknowns, besides what every solver refuses."""
         super().check(problem)
-        rows, n = sum(problem.sizes), problem.n
+        rows, n = sum(e.A.shape[0] for e in problem.equations if e.weight > 0.0), problem.n
         if rows < n:
             raise UnsupportedProblem(
                 f"solver {self.name!r} has {rows} rows for {n} unknowns; add {n - rows} equations, "
@@ -48,7 +53,16 @@ class ExtendedJacobian(PolicySolver):
             )
 
     def _impl(self, systems: list[System], problem: Problem, u0: FloatArray | None) -> Answer:
-        A, c, ratio = stack(systems, problem.equations)
+        A, c, ratio = stack(_balanced(systems), problem.equations)
         decomposition = svd(A)
         size = ratio * scale(A)
         return Answer(self.policy.solve(decomposition, c, size), self.policy.rank(decomposition.s, size) < A.shape[1])
+
+
+def _balanced(systems: list[System]) -> list[System]:
+    """Equations of quite another size brought to that of the first: an objective's rows have a unit of their own."""
+    first = scale(systems[0].A)
+    sizes = [scale(system.A) for system in systems]
+    apart = [size > 0.0 and first > 0.0 and not 1e-3 < size / first < 1e3 for size in sizes]
+    factors = [first / size if far else 1.0 for size, far in zip(sizes, apart, strict=True)]
+    return [System(f * A, f * c, ratio) for f, (A, c, ratio) in zip(factors, systems, strict=True)]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
+from functools import cached_property
 from typing import ClassVar
 
 from cartctl.algebra.inverses import InversePolicy
@@ -26,12 +27,20 @@ class FilteredSolver(EquationSolver):
     @property
     def damps(self) -> bool:
         """Whether the policy holds back what it could deliver."""
-        return self.filter().damps
+        return self._filter.damps
+
+    def prepare(self) -> None:
+        """Prepare the policy."""
+        self._filter.prepare()
+
+    @cached_property
+    def _filter(self) -> InversePolicy:
+        return self.filter()
 
     def _impl(self, systems: list[System], problem: Problem, u0: FloatArray | None) -> Answer:
         A, c, ratio = stack(systems, problem.equations)
         decomposition = svd(A)
-        size, policy = ratio * scale(A), self.filter()
+        size, policy = ratio * scale(A), self._filter
         u = policy.solve(decomposition, c, size)
         if u0 is not None:
             u = u + null_part(decomposition, ratio * round_off(A), u0)

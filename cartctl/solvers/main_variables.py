@@ -20,6 +20,8 @@ from cartctl.checks import FloatArray
 from cartctl.solvers.base import Answer, System, stack
 from cartctl.solvers.policy import PolicySolver
 
+_DEPENDENT = 1e-10  # relative to the task's own matrix: a row that adds less than this depends on the others
+
 
 @dataclass(frozen=True)
 class MainVariables(PolicySolver):
@@ -33,17 +35,18 @@ class MainVariables(PolicySolver):
 
     def _impl(self, systems: list[System], problem: Problem, u0: FloatArray | None) -> Answer:
         A, c, ratio = stack(systems, problem.equations)
-        rows = main_rows(A, ratio * round_off(A))
+        rows = main_rows(A, max(ratio * round_off(A), _DEPENDENT * ratio * scale(A)))
         kept = np.asfortranarray(A[rows])
-        u = self.policy.solve(svd(kept), c[rows], ratio * scale(A))
-        return Answer(u, rows.shape[0] < min(A.shape))
+        decomposition, size = svd(kept), ratio * scale(A)
+        u = self.policy.solve(decomposition, c[rows], size)
+        return Answer(u, self.policy.rank(decomposition.s, size) < min(A.shape))
 
 
-def main_rows(A: FloatArray, floor: float) -> NDArray[np.intp]:
-    """The numbers of rank(A) independent rows of A (m, n), ascending; ``floor`` decides what counts as zero."""
+def main_rows(A: FloatArray, floor: float | None = None) -> NDArray[np.intp]:
+    """The numbers of rank(A) independent rows of A (m, n), ascending; below ``floor`` (round-off) they depend."""
     m, n = A.shape
     if m == 0 or n == 0:
         return np.zeros(0, dtype=np.intp)
     factor, pivots, _, _, _ = lapack.dgeqp3(A.T)
-    rank = int((np.abs(factor.diagonal()) > floor).sum())
+    rank = int((np.abs(factor.diagonal()) > (round_off(A) if floor is None else floor)).sum())
     return np.sort(pivots[:rank] - 1).astype(np.intp)

@@ -28,3 +28,7 @@ class PolicySolver(EquationSolver):
     def damps(self) -> bool:
         """Whether the policy holds back what it could deliver."""
         return self.policy.damps
+
+    def prepare(self) -> None:
+        """Prepare the policy."""
+        self.policy.prepare()

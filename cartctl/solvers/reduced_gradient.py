@@ -20,10 +20,11 @@ from scipy.linalg import lapack
 from cartctl.algebra.inverses import Truncated
 from cartctl.algebra.nullspace import null_part
 from cartctl.algebra.problem import Problem
-from cartctl.algebra.svd import numerical_rank, round_off, scale, svd
+from cartctl.algebra.svd import round_off, scale, svd
 from cartctl.checks import FloatArray
 from cartctl.solvers.base import Answer, EquationSolver, System, stack
 
+_SINGULAR = 1e-10  # relative to the task's own matrix, as the truncated inverse has it
 _FEW = 210  # minors worth trying one by one: all of n <= 10
 
 
@@ -38,17 +39,23 @@ class ReducedGradient(EquationSolver):
     stacks: ClassVar[bool] = True
     name: ClassVar[str] = "reduced-gradient"
     honours: ClassVar[frozenset[str]] = frozenset({"reference"})
-    takes_metric: ClassVar[bool] = False
+
+    @property
+    def takes_metric(self) -> bool:
+        """No: the split of the joints has none."""
+        return False
 
     def _impl(self, systems: list[System], problem: Problem, u0: FloatArray | None) -> Answer:
         A, c, ratio = stack(systems, problem.equations)
         m, n = A.shape
         if m == 0:
             return Answer(np.zeros(n) if u0 is None else u0.copy(), False)
-        chosen = best_minor(A, ratio * round_off(A)) if m <= n else None
+        chosen = best_minor(A, max(ratio * round_off(A), _SINGULAR * ratio * scale(A))) if m <= n else None
         if chosen is None:
             return self._without_minor(System(A, c, ratio), u0)
-        rest = np.setdiff1d(np.arange(n), chosen)
+        others = np.ones(n, dtype=bool)
+        others[chosen] = False
+        rest = np.flatnonzero(others)
         factor, pivots, _ = lapack.dgetrf(A[:, chosen])
         u = np.zeros(n)
         if u0 is None or rest.shape[0] == 0:
@@ -66,16 +73,23 @@ class ReducedGradient(EquationSolver):
         u = Truncated().solve(decomposition, c, ratio * scale(A))
         if u0 is not None:
             u = u + null_part(decomposition, ratio * round_off(A), u0)
-        return Answer(u, numerical_rank(decomposition.s, ratio * round_off(A)) < min(A.shape))
+        return Answer(u, Truncated().rank(decomposition.s, ratio * scale(A)) < min(A.shape))
 
 
-def best_minor(A: FloatArray, floor: float) -> NDArray[np.intp] | None:
-    """The m columns of A (m, n) whose minor has the largest |det|, sorted; None where rank A < m, by ``floor``."""
+def best_minor(A: FloatArray, floor: float | None = None) -> NDArray[np.intp] | None:
+    """The m columns of A (m, n) whose minor has the largest |det|, sorted; None where rank A < m.
+
+    floor: what counts as zero; round-off if None.
+    """
     m, n = A.shape
     factor, pivots, _, _, info = lapack.dgeqp3(A)
     diagonal = np.abs(factor.diagonal()[:m])
-    if info != 0 or diagonal.min(initial=0.0) <= 0.0 or diagonal[-1] <= floor:
+    if info != 0 or not diagonal[-1] > (round_off(A) if floor is None else floor):
         return None
+    if n == m + 1:  # the minor without joint j is proportional to entry j of the null vector
+        along, _ = lapack.dtrtrs(factor[:, :m], factor[:, m:])
+        left_out = m if float(np.abs(along).max()) <= 1.0 else int(np.abs(along).argmax())
+        return np.sort(np.delete(pivots, left_out) - 1).astype(np.intp)
     if comb(n, m) > _FEW:
         return np.sort(pivots[:m] - 1).astype(np.intp)
     choices = _choices(n, m)

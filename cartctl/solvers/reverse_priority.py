@@ -1,8 +1,9 @@
 """Reverse priority: from the lowest task up, u_k = u_{k+1} + T_k (A_k T_k)# (b_k - d_k - A_k u_{k+1}).
 
 T_k are the first m_k columns of pinv([A_k; ...; A_p]): corrections along them meet task k and disturb those below as
-little as can be; u_{p+1} = u0 (Flacco & De Luca 2014). The task of highest priority is corrected last, so it is met
-exactly wherever it can be, and an algorithmic singularity between lower tasks does not touch it.
+little as can be; u_{p+1} = 0, and u0 fills the null space of all tasks (Flacco & De Luca 2014). The task of highest
+priority is corrected last, so it is met exactly wherever it can be, and an algorithmic singularity between lower tasks
+does not touch it.
 """
 
 from __future__ import annotations
@@ -13,10 +14,13 @@ from typing import ClassVar
 import numpy as np
 
 from cartctl.algebra.inverses import Truncated
+from cartctl.algebra.nullspace import null_part
 from cartctl.algebra.problem import Problem
-from cartctl.algebra.svd import SVD, scale, singular_values, svd
+from cartctl.algebra.svd import ROUND_OFF, SVD, round_off, scale, singular_values, svd
 from cartctl.checks import FloatArray
 from cartctl.solvers.base import Answer, EquationSolver, System
+
+_EXACT = Truncated(1e-13)
 
 
 @dataclass(frozen=True)
@@ -36,7 +40,7 @@ class ReversePriority(EquationSolver):
     def _impl(self, systems: list[System], problem: Problem, u0: FloatArray | None) -> Answer:
         n = problem.n
         policy = Truncated(self.cutoff)
-        u = np.zeros(n) if u0 is None else np.array(u0)
+        u = np.zeros(n)
         below = np.zeros((0, n))
         size = 0.0
         lost_rank = False
@@ -50,9 +54,11 @@ class ReversePriority(EquationSolver):
             stacked = svd(below)
             size = max(size, ratio * scale(A), scale(below))
             T = _first_columns(stacked, m, policy.factors(stacked.s, size))
-            # A T has no unit and is the identity where the rows are independent: its scale is one a row
-            correction = policy.solve(svd(np.asfortranarray(A @ T)), c - A @ u, float(np.sqrt(m)))
+            # the round-off of A T is that of its factors, whatever their units
+            correction = _EXACT.solve(svd(np.asfortranarray(A @ T)), c - A @ u, scale(A) * scale(T))
             u = u + T @ correction
+        if u0 is not None:
+            u = u + null_part(svd(below), max(round_off(below), ROUND_OFF * n * size), u0)
         return Answer(u, lost_rank)
 
 

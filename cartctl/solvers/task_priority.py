@@ -39,7 +39,7 @@ class TaskPriority(PolicySolver):
                 break
             restricted = svd(free.restrict(A))
             size = ratio * scale(A)
-            u = u + free.lift(self.policy.solve(restricted, c - A @ u, size))
+            u = u + self.policy.solve(free.lift(restricted), c - A @ u, size)
             lost_rank |= self.policy.rank(restricted.s, size) < min(A.shape[0], free.dimension)
             free.narrow(restricted, ratio * round_off(A))
         return Answer(u if u0 is None else u + free.project(u0 - u), lost_rank)

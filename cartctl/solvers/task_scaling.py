@@ -44,18 +44,30 @@ class TaskScaling(Solver):
         slowed = np.array([e.fit == "scale" for e in problem.equations])
         if low > high:
             u = _clipped(problem, still)
-            return Solution(problem, u, self.name, status=Status.INFEASIBLE, scales=np.where(slowed, 0.0, 1.0))
+            stopped = np.where(slowed, 0.0, 1.0)
+            return Solution(problem, u, self.name, self, Status.INFEASIBLE, lost_rank, stopped, *_saturated(problem, u))
         if high >= 1.0:
             return Solution(problem, full, self.name, self, None, lost_rank)
         u = _clipped(problem, still + high * rate)
         scales = np.where(slowed, high, 1.0)
-        return Solution(problem, u, self.name, self, None, lost_rank, scales, _saturated(problem, u))
+        return Solution(problem, u, self.name, self, None, lost_rank, scales, *_saturated(problem, u))
+
+    def task_part(self, solution: Solution) -> FloatArray:
+        """What of an answer the tasks ask for, (n,), at the scale it has."""
+        return solution.u - _null_part(solution.problem)
 
     def grade(self, solution: Solution) -> Status:
         """SCALED where the commands were slowed, else by rank and residuals."""
         if solution.scales.min(initial=1.0) < 1.0:
             return Status.SCALED
         return super().grade(solution)
+
+
+def _null_part(problem: Problem) -> FloatArray:
+    """``(I - A# A) u0``, (n,)."""
+    with_it, _, _ = _ends(problem)
+    without, _, _ = _ends(problem.without_reference())
+    return with_it - without
 
 
 def feasible_scales(problem: Problem, offset: FloatArray, rate: FloatArray) -> tuple[float, float]:
@@ -109,9 +121,15 @@ def _clipped(problem: Problem, u: FloatArray) -> FloatArray:
     return u if problem.upper is None else np.minimum(u, problem.upper)
 
 
-def _saturated(problem: Problem, u: FloatArray) -> NDArray[np.int8]:
-    sides = np.zeros(problem.n, dtype=np.int8)
-    for bound, side in ((problem.lower, -1), (problem.upper, 1)):
+def _saturated(problem: Problem, u: FloatArray) -> tuple[NDArray[np.int8], NDArray[np.int8]]:
+    """Which entries of u and which constraint rows sit on a bound: -1 at the lower, +1 at the upper."""
+    C, c_low, c_high = problem.constraints or (np.zeros((0, problem.n)), None, None)
+    return _sides(u, problem.lower, problem.upper), _sides(C @ u, c_low, c_high)
+
+
+def _sides(values: FloatArray, lower: FloatArray | None, upper: FloatArray | None) -> NDArray[np.int8]:
+    sides = np.zeros(values.shape[0], dtype=np.int8)
+    for bound, side in ((lower, -1), (upper, 1)):
         if bound is not None:
-            sides[np.isclose(u, bound, rtol=1e-10, atol=0.0)] = side
+            sides[np.abs(values - bound) <= 1e-10 * np.maximum(1.0, np.abs(bound))] = side
     return sides

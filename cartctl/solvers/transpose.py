@@ -14,7 +14,8 @@ import numpy as np
 
 from cartctl import checks
 from cartctl.algebra.problem import Problem
-from cartctl.algebra.svd import norm, scale
+from cartctl.algebra.solution import Solution, Status
+from cartctl.algebra.svd import norm, round_off, scale, singular_values
 from cartctl.checks import FloatArray
 from cartctl.errors import ParameterError
 from cartctl.solvers.base import Answer, EquationSolver, System, stack
@@ -56,3 +57,12 @@ class Transpose(EquationSolver):
         moved = norm(A @ slope)
         ratio = norm(slope) / moved if moved > 0.0 else 0.0
         return Answer(ratio * ratio * slope, False)
+
+    def grade(self, solution: Solution) -> Status:
+        """SINGULAR where the stacked matrix lost rank, decided when somebody asks."""
+        systems = [System(e.A, e.rhs, e.ratio) for e in solution.problem.equations]
+        A, _, size = stack(systems, solution.problem.equations)
+        s = singular_values(A)
+        if s.shape[0] and s[-1] <= size * round_off(A):
+            return Status.SINGULAR
+        return super().grade(solution)

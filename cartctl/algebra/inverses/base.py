@@ -15,6 +15,7 @@ import numpy as np
 from cartctl.algebra.svd import SVD
 from cartctl.checks import FloatArray
 
+_SQUARABLE = 1e150
 NOISE = 1e-13  # singular values below this, relative to the task's own matrix, are round-off
 
 
@@ -25,6 +26,10 @@ class InversePolicy(ABC):
     """
 
     damps: ClassVar[bool] = True
+
+    def prepare(self) -> None:
+        """Compile what the first solve would otherwise wait for; nothing, unless a policy has a kernel."""
+        return
 
     @abstractmethod
     def factors(self, s: FloatArray, scale: float) -> FloatArray:
@@ -46,6 +51,8 @@ class InversePolicy(ABC):
 
 def damped_factors(s: FloatArray, squared: FloatArray | float, scale: float) -> FloatArray:
     """``sigma / (sigma^2 + squared)``, (k,); 0 where sigma is round-off of a matrix of norm ``scale``."""
+    if s.shape[0] and s[-1] > NOISE * scale and s[0] < _SQUARABLE:
+        return s / (s * s + squared)
     phi = np.zeros_like(s)
     kept = s > NOISE * scale
     with np.errstate(over="ignore"):

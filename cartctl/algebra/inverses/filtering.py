@@ -36,8 +36,12 @@ class NumericalFiltering(InversePolicy):
 
     def rank(self, s: FloatArray, scale: float) -> int:
         """How many singular values outweigh their damping."""
+        if s.shape[0] and s[-1] > max(self.threshold, self.beta, NOISE * scale):
+            return s.shape[0]  # type: ignore[no-any-return]
         return int((s > np.maximum(np.sqrt(self._squared(s)), NOISE * scale)).sum())
 
-    def _squared(self, s: FloatArray) -> FloatArray:
+    def _squared(self, s: FloatArray) -> FloatArray | float:
+        if s.shape[0] and s[-1] >= self.threshold:
+            return self.beta**2
         shortfall = np.maximum(0.0, 1.0 - (s / self.threshold) ** 2)
         return self.beta**2 + self.damping**2 * shortfall

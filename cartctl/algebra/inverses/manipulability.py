@@ -2,19 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
-
-import numpy as np
 
 from cartctl import checks
 from cartctl.algebra.inverses.base import NOISE, InversePolicy, damped_factors
 from cartctl.algebra.svd import numerical_rank
 from cartctl.checks import FloatArray
-
-
-def _product(s: FloatArray) -> float:
-    with np.errstate(over="ignore"):
-        return float(np.prod(s))
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,4 +35,4 @@ class ManipulabilityDamped(InversePolicy):
         return numerical_rank(s, max(self._damping(s), NOISE * scale))
 
     def _damping(self, s: FloatArray) -> float:
-        return self.damping * max(0.0, 1.0 - _product(s) / self.threshold)
+        return self.damping * max(0.0, 1.0 - math.prod(s.tolist()) / self.threshold)  # type: ignore[no-any-return]

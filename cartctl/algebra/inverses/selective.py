@@ -22,10 +22,15 @@ class SelectivelyDamped(InversePolicy):
     ``clamp(x, g)`` shortens x until its largest entry is g. The right-hand side decides: a command that asks nothing of
     a small direction is not damped.
 
-    limit: gamma_max > 0, the largest entry of the answer, in its units (rad/s at the velocity level).
+    limit: gamma_max > 0, the largest entry of the answer, in its units (rad/s at the velocity level); where the problem
+    has a metric W = L L^T, of L^T u.
     """
 
     limit: float = np.pi
+
+    def prepare(self) -> None:
+        """Compile the clamped sum, or fetch it from its cache."""
+        _ = clamped_sum.compiled
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "limit", checks.number("limit", self.limit, low=0.0, strict=True))
