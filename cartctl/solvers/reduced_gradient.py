@@ -25,7 +25,7 @@ from cartctl.checks import FloatArray
 from cartctl.solvers.base import Answer, EquationSolver, System, stack
 
 _SINGULAR = 1e-10  # relative to the task's own matrix, as the truncated inverse has it
-_FEW = 210  # minors worth trying one by one: all of n <= 10
+_FEW = 210  # minors worth trying one by one: all of n <= 9
 
 
 @dataclass(frozen=True)

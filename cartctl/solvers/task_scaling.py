@@ -47,7 +47,7 @@ class TaskScaling(Solver):
             stopped = np.where(slowed, 0.0, 1.0)
             return Solution(problem, u, self.name, self, Status.INFEASIBLE, lost_rank, stopped, *_saturated(problem, u))
         if high >= 1.0:
-            return Solution(problem, full, self.name, self, None, lost_rank)
+            return Solution(problem, _clipped(problem, full), self.name, self, None, lost_rank)
         u = _clipped(problem, still + high * rate)
         scales = np.where(slowed, high, 1.0)
         return Solution(problem, u, self.name, self, None, lost_rank, scales, *_saturated(problem, u))

@@ -14,8 +14,8 @@ from cartctl.checks import FloatArray
 class Damped(InversePolicy):
     """``phi = sigma / (sigma^2 + lambda^2)`` (Nakamura & Hanafusa 1986; Wampler 1986).
 
-    damping: lambda > 0, in the units of the task's singular values (m/rad for positions); ||u|| stays below
-    ||b|| / (2 lambda).
+    damping: lambda > 0, in the units of the task's singular values (m/rad for positions); ||u|| (in
+    the norm of the metric) stays below ||b|| / (2 lambda).
     """
 
     damping: float = 1e-2
