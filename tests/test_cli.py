@@ -708,3 +708,10 @@ def test_numbers_stay_short(value: float | None, text: str) -> None:
 def test_axes_that_no_path_moves_are_refused(arm: str, plain: None) -> None:
     result = cartctl("track", arm, *QUICK, "--axes", "rz")
     assert result.exit_code == 2 and "holds no position" in result.stderr
+
+
+@pytest.mark.parametrize("args", [["track", "panda", "--laps", "1.5"], ["trak"], ["track"], ["info", "--nope"]])
+def test_wrong_usage_is_one_line_too(args: list[str]) -> None:
+    result = process(*args)
+    assert result.returncode == 2
+    assert result.stderr.startswith(b"error: ") and result.stderr.count(b"\n") == 1 and b"--help" in result.stderr
