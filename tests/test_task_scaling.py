@@ -8,7 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import linprog
 
-from cartctl import Equation, Problem, Status, solve
+from cartctl import Damped, Equation, Problem, SelectivelyDamped, Status, TaskScaling, solve
+from cartctl.errors import ParameterError
 from tests import oracles
 from tests import tolerances as tol
 
@@ -239,3 +240,20 @@ def test_both_parts_of_a_scaled_answer(seed):
         return
     np.testing.assert_allclose(A @ solution.null_part, 0.0, atol=tol.ORACLE)
     np.testing.assert_allclose(A @ solution.task_part, solution.scales[0] * b, atol=tol.ORACLE)
+
+
+@given(oracles.SEEDS)
+def test_any_policy_that_is_linear_in_the_command(seed):
+    """A damped scaled answer is A^#(s b - d) with the damped inverse; a policy that looks at the command is refused."""
+    rng = np.random.default_rng(seed)
+    A, b, d, lam = oracles.matrix(rng, 3, 6), 5.0 * rng.normal(size=3), 0.05 * rng.normal(size=3), 0.3
+    damped = A.T @ np.linalg.inv(A @ A.T + lam**2 * np.eye(3))
+    p = Problem([Equation(A, b, drift=d)], lower=-np.ones(6), upper=np.ones(6))
+    solution = solve(p, TaskScaling(Damped(lam)))
+    np.testing.assert_allclose(solution.u, damped @ (solution.scales[0] * b - d), atol=tol.ORACLE)
+    assert solution.bound_violation() == 0.0
+    assert solution.status in (Status.SCALED, Status.DAMPED)
+    with pytest.raises(ParameterError, match="not linear"):
+        TaskScaling(SelectivelyDamped())
+    with pytest.raises(ParameterError, match="policy is"):
+        TaskScaling("damped")

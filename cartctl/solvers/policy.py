@@ -19,10 +19,7 @@ class PolicySolver(EquationSolver):
     policy: InversePolicy = field(default_factory=Truncated)
 
     def __post_init__(self) -> None:
-        if not isinstance(self.policy, InversePolicy):
-            raise ParameterError(
-                f"policy is {self.policy!r}; expected an InversePolicy such as cc.Truncated() or cc.Damped()"
-            )
+        check_policy(self.policy)
 
     @property
     def damps(self) -> bool:
@@ -32,3 +29,9 @@ class PolicySolver(EquationSolver):
     def prepare(self) -> None:
         """Prepare the policy."""
         self.policy.prepare()
+
+
+def check_policy(policy: object) -> None:
+    """Refuse what is no InversePolicy; raises ParameterError."""
+    if not isinstance(policy, InversePolicy):
+        raise ParameterError(f"policy is {policy!r}; expected an InversePolicy such as cc.Truncated() or cc.Damped()")

@@ -6,35 +6,54 @@ commands are slowed alike; equations with ``fit="least_squares"`` are not slowed
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from cartctl.algebra.inverses import Truncated
+from cartctl.algebra.inverses import InversePolicy, Truncated
 from cartctl.algebra.metric import Whitening
 from cartctl.algebra.nullspace import null_part
 from cartctl.algebra.problem import Problem
 from cartctl.algebra.solution import Solution, Status
 from cartctl.algebra.svd import round_off, scale, svd
 from cartctl.checks import FloatArray, is_finite
+from cartctl.errors import ParameterError
 from cartctl.solvers.base import Solver, System, stack
+from cartctl.solvers.policy import check_policy
 
 _SLACK = 1e-12  # relative: a bound met to round-off is met
 
 
 @dataclass(frozen=True)
 class TaskScaling(Solver):
-    """Slow the commands until the pseudo-inverse's answer stays within the bounds."""
+    """Slow the commands until the pseudo-inverse's answer stays within the bounds.
+
+    policy: what becomes of small singular values; one whose answer is linear in the command. Raises ParameterError.
+    """
 
     stacks: ClassVar[bool] = True
     name: ClassVar[str] = "task-scaling"
     honours: ClassVar[frozenset[str]] = frozenset({"bounds", "constraints", "reference"})
+    policy: InversePolicy = field(default_factory=Truncated)
+
+    def __post_init__(self) -> None:
+        check_policy(self.policy)
+        if not self.policy.linear:
+            raise ParameterError(
+                f"policy is {self.policy!r}, whose answer is not linear in the command, so no scale is in closed form; "
+                "use another policy"
+            )
+
+    @property
+    def damps(self) -> bool:
+        """Whether the policy holds back what it could deliver."""
+        return self.policy.damps
 
     def _solve_impl(self, problem: Problem) -> Solution:
         try:
-            full, still, lost_rank = _ends(problem)
+            full, still, lost_rank = _ends(problem, self.policy)
         except FloatingPointError:  # LAPACK met infinities
             full = still = np.full(problem.n, np.nan)
         if not (is_finite(full) and is_finite(still)):
@@ -54,7 +73,7 @@ class TaskScaling(Solver):
 
     def task_part(self, solution: Solution) -> FloatArray:
         """What of an answer the tasks ask for, (n,), at the scale it has."""
-        return solution.u - _null_part(solution.problem)
+        return solution.u - _null_part(solution.problem, self.policy)
 
     def grade(self, solution: Solution) -> Status:
         """SCALED where the commands were slowed, else by rank and residuals."""
@@ -63,10 +82,10 @@ class TaskScaling(Solver):
         return super().grade(solution)
 
 
-def _null_part(problem: Problem) -> FloatArray:
+def _null_part(problem: Problem, policy: InversePolicy) -> FloatArray:
     """``(I - A# A) u0``, (n,)."""
-    with_it, _, _ = _ends(problem)
-    without, _, _ = _ends(problem.without_reference())
+    with_it, _, _ = _ends(problem, policy)
+    without, _, _ = _ends(problem.without_reference(), policy)
     return with_it - without
 
 
@@ -91,7 +110,7 @@ def feasible_scales(problem: Problem, offset: FloatArray, rate: FloatArray) -> t
     return (low, high) if high < low - _SLACK else (low, max(high, low))
 
 
-def _ends(problem: Problem) -> tuple[FloatArray, FloatArray, bool]:
+def _ends(problem: Problem, policy: InversePolicy) -> tuple[FloatArray, FloatArray, bool]:
     """The answers at s = 1 and s = 0, from one SVD, and whether rank was lost."""
     white = None if problem.metric is None else Whitening(problem.metric)
     systems = []
@@ -102,7 +121,7 @@ def _ends(problem: Problem) -> tuple[FloatArray, FloatArray, bool]:
         systems.append(System(A, np.array([rhs, still]).T, e.ratio))
     A, c, ratio = stack(systems, problem.equations)
     decomposition = svd(A)
-    size, policy = ratio * scale(A), Truncated()
+    size = ratio * scale(A)
     k = decomposition.s.shape[0]
     phi = policy.factors(decomposition.s, size)
     ends = (decomposition.Vt[:k].T * phi) @ (decomposition.U.T @ c)

@@ -22,10 +22,11 @@ NOISE = 1e-13  # singular values below this, relative to the task's own matrix, 
 class InversePolicy(ABC):
     """A choice of filter factors phi(sigma), applied to one right-hand side.
 
-    damps: whether a policy holds back directions that it could invert.
+    damps: whether a policy holds back directions that it could invert. linear: whether its answer is linear in b.
     """
 
     damps: ClassVar[bool] = True
+    linear: ClassVar[bool] = True
 
     def prepare(self) -> None:
         """Compile what the first solve would otherwise wait for; nothing, unless a policy has a kernel."""

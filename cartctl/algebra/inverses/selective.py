@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -26,6 +27,7 @@ class SelectivelyDamped(InversePolicy):
     has a metric W = L L^T, of L^T u.
     """
 
+    linear: ClassVar[bool] = False
     limit: float = np.pi
 
     def prepare(self) -> None:
