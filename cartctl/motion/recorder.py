@@ -41,11 +41,12 @@ class Recorder:
         self._command[k], self._spent[k] = command.velocity, spent * 1e-9
         self._status.append(command.solution.status.name)
         solution, controller = command.solution, self._controller
+        state = controller.observe(q, v)
         for i, (rows, task) in enumerate(zip(self._tasks, controller.tasks, strict=True)):
             rows.error[k] = command.references[i].error
             rows.scale[k] = solution.scales[i]
             rows.singular[k] = singular_values(np.asfortranarray(solution.problem.equations[i].A))
-            rows.see(k, task.observe(controller.observe(q, v), self.time_of(k), controller.anchors[i]))
+            rows.see(k, task.observe(state, self.time_of(k), controller.anchors[i]))
         self._made = k + 1
 
     def close(self, q: FloatArray, v: FloatArray) -> None:

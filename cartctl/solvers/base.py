@@ -36,11 +36,13 @@ class Solver(ABC):
         self.check(problem)
         solution = self._solve_impl(problem)
         u = solution.u
-        if u.shape != (problem.n,) or not is_finite(u):
-            raise SolverOutputError(
-                f"solver {self.name!r} returned u of shape {np.shape(u)}: {u}; expected ({problem.n},) finite numbers"
-            )
-        return solution
+        return solution if u.shape == (problem.n,) and is_finite(u) else self._astray(problem, u)
+
+    def _astray(self, problem: Problem, u: FloatArray) -> Solution:
+        """What to make of an answer that is none: the fault of whoever wrote the solver."""
+        raise SolverOutputError(
+            f"solver {self.name!r} returned u of shape {np.shape(u)}: {u}; expected ({problem.n},) finite numbers"
+        )
 
     @property
     def takes_metric(self) -> bool:
@@ -118,25 +120,36 @@ class EquationSolver(Solver):
         try:
             answer = self._whitened(problem)
         except FloatingPointError:  # LAPACK met infinities
-            answer = None
-        if answer is None or not is_finite(answer.u):
-            return Solution(problem, np.zeros(problem.n), self.name, status=Status.FAILED)
+            return _failed(problem, self.name)
         return Solution(problem, answer.u, self.name, self, None, answer.lost_rank)
+
+    def _astray(self, problem: Problem, u: FloatArray) -> Solution:
+        """FAILED where the numbers over- or underflowed."""
+        return _failed(problem, self.name) if u.shape == (problem.n,) else super()._astray(problem, u)
 
     def _whitened(self, problem: Problem) -> Answer:
         """The answer in the metric of the problem."""
-        systems = [System(e.A, e.rhs, e.ratio) for e in problem.equations]
         u0 = problem.reference
         if problem.metric is None:
-            return self._impl(systems, problem, u0)
+            return self._impl(systems_of(problem), problem, u0)
         white = Whitening(problem.metric)
-        systems = [System(white.matrix(A), c, ratio) for A, c, ratio in systems]
-        answer = self._impl(systems, problem, None if u0 is None else white.forward(u0))
+        answer = self._impl(systems_of(problem, white), problem, None if u0 is None else white.forward(u0))
         return Answer(white.back(answer.u), answer.lost_rank)
 
     @abstractmethod
     def _impl(self, systems: list[System], problem: Problem, u0: FloatArray | None) -> Answer:
         """Minimise 1/2 ||u - u0||^2 over the answers to ``systems`` as this method sees them."""
+
+
+def _failed(problem: Problem, name: str) -> Solution:
+    return Solution(problem, np.zeros(problem.n), name, status=Status.FAILED)
+
+
+def systems_of(problem: Problem, white: Whitening | None = None) -> list[System]:
+    """Every equation of a problem, whitened if a whitening is given."""
+    if white is None:
+        return [System(e.A, e.rhs, e.ratio) for e in problem.equations]
+    return [System(white.matrix(e.A), e.rhs, e.ratio) for e in problem.equations]
 
 
 def stack(systems: list[System], equations: tuple[Equation, ...]) -> System:

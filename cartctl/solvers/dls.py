@@ -22,7 +22,7 @@ from cartctl.algebra.solution import Solution, Status
 from cartctl.algebra.svd import round_off, singular_values, svd
 from cartctl.checks import FloatArray
 from cartctl.kernels import kernel
-from cartctl.solvers.base import Answer, EquationSolver, System, stack
+from cartctl.solvers.base import Answer, EquationSolver, System, stack, systems_of
 
 
 @dataclass(frozen=True)
@@ -60,8 +60,7 @@ class DLS(EquationSolver):
         """SINGULAR where damping outweighs a direction, sigma_min < lambda, or round-off does; asked only now."""
         problem = solution.problem
         white = None if problem.metric is None else Whitening(problem.metric)
-        systems = [System(e.A if white is None else white.matrix(e.A), e.rhs, e.ratio) for e in problem.equations]
-        A, _, ratio = stack(systems, problem.equations)
+        A, _, ratio = stack(systems_of(problem, white), problem.equations)
         s = singular_values(A)
         if s.shape[0] and s[-1] < max(self.damping, ratio * round_off(A)):
             return Status.SINGULAR

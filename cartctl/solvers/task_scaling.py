@@ -20,7 +20,7 @@ from cartctl.algebra.solution import Solution, Status
 from cartctl.algebra.svd import round_off, scale, svd
 from cartctl.checks import FloatArray, is_finite
 from cartctl.errors import ParameterError
-from cartctl.solvers.base import Solver, System, stack
+from cartctl.solvers.base import Solver, stack, systems_of
 from cartctl.solvers.policy import check_policy
 
 _SLACK = 1e-12  # relative: a bound met to round-off is met
@@ -113,12 +113,10 @@ def feasible_scales(problem: Problem, offset: FloatArray, rate: FloatArray) -> t
 def _ends(problem: Problem, policy: InversePolicy) -> tuple[FloatArray, FloatArray, bool]:
     """The answers at s = 1 and s = 0, from one SVD, and whether rank was lost."""
     white = None if problem.metric is None else Whitening(problem.metric)
-    systems = []
-    for e in problem.equations:
-        rhs = e.rhs
-        still = rhs if e.fit != "scale" else rhs - e.b
-        A = e.A if white is None else white.matrix(e.A)
-        systems.append(System(A, np.array([rhs, still]).T, e.ratio))
+    systems = [
+        system._replace(c=np.array([system.c, system.c - e.b if e.fit == "scale" else system.c]).T)
+        for e, system in zip(problem.equations, systems_of(problem, white), strict=True)
+    ]
     A, c, ratio = stack(systems, problem.equations)
     decomposition = svd(A)
     size = ratio * scale(A)

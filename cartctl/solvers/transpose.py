@@ -18,7 +18,7 @@ from cartctl.algebra.solution import Solution, Status
 from cartctl.algebra.svd import norm, round_off, scale, singular_values
 from cartctl.checks import FloatArray
 from cartctl.errors import ParameterError
-from cartctl.solvers.base import Answer, EquationSolver, System, stack
+from cartctl.solvers.base import Answer, EquationSolver, System, stack, systems_of
 
 _NOISE = 1e-10  # relative to the task's own matrix: a smaller slope says nothing of where to go
 
@@ -60,8 +60,7 @@ class Transpose(EquationSolver):
 
     def grade(self, solution: Solution) -> Status:
         """SINGULAR where the stacked matrix lost rank, decided when somebody asks."""
-        systems = [System(e.A, e.rhs, e.ratio) for e in solution.problem.equations]
-        A, _, size = stack(systems, solution.problem.equations)
+        A, _, size = stack(systems_of(solution.problem), solution.problem.equations)
         s = singular_values(A)
         if s.shape[0] and s[-1] <= size * round_off(A):
             return Status.SINGULAR
