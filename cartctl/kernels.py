@@ -1,8 +1,9 @@
 """Compiled kernels: plain array functions in the subset numba compiles, compiled when first used, cached on disk.
 
-A kernel stays in the file of its method, decorated with :func:`kernel`; importing it does not import numba. The cache
-folder is keyed by a hash of the package's sources, because numba's own key misses changes in a callee of another
-file. With ``NUMBA_DISABLE_JIT=1`` the same functions run as Python.
+A kernel stays in the file of its method, decorated with :func:`kernel`; importing it does not import numba. A large one
+is made of functions decorated with :func:`part`, which are compiled into it. The cache folder is keyed by a hash of the
+package's sources, because numba's own key misses changes in a callee of another file. With ``NUMBA_DISABLE_JIT=1`` the
+same functions run as Python.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from functools import lru_cache
 from pathlib import Path
+from types import FunctionType
 from typing import Any, Generic, ParamSpec, TypeVar
 
 from platformdirs import user_cache_path
@@ -29,13 +31,17 @@ _KEPT_CACHES = 4
 _OURS = re.compile(r"[0-9a-f]{16}")
 _log = logging.getLogger("cartctl")
 
+# Sums may be reordered and fused, so that dot products are vectorised; nan and inf keep their meaning.
+_FAST = {"reassoc", "contract", "nsz"}
+
 
 class Kernel(Generic[P, R]):
     """A function that compiles itself, for one signature, when it is first called or asked for."""
 
-    def __init__(self, function: Callable[P, R], signature: str) -> None:
+    def __init__(self, function: Callable[P, R], signature: str, fast: bool) -> None:
         self.function = function
         self.signature = signature
+        self.fast = fast
         self.__doc__ = function.__doc__
         self.__name__ = function.__name__
 
@@ -50,8 +56,49 @@ class Kernel(Generic[P, R]):
             return self._compiled
         except AttributeError:
             with _deferred_interrupt():
-                self._compiled: Callable[P, R] = _compile(self.function, self.signature)
+                self._compiled: Callable[P, R] = _compile(self)
             return self._compiled
+
+
+class Part(Generic[P, R]):
+    """A function that kernels are made of; called from Python, it runs as Python."""
+
+    def __init__(self, function: Callable[P, R]) -> None:
+        self.function = function
+        self.__doc__ = function.__doc__
+        self.__name__ = function.__name__
+        self._inner: Any = None
+
+    def __call__(self, *args: P.args, **kwargs: P.kwargs) -> R:
+        """Run as Python."""
+        return self.function(*args, **kwargs)
+
+    @property
+    def inner(self) -> Any:
+        """What a kernel calls: compiled with it, for the types it is called with."""
+        if self._inner is None:
+            import numba
+
+            self._inner = numba.njit(error_model="numpy", fastmath=_FAST)(_with_parts(self.function))
+        return self._inner
+
+
+def part(function: Callable[P, R]) -> Part[P, R]:
+    """Mark a function as a part of kernels in this or another file."""
+    return Part(function)
+
+
+def _with_parts(function: Callable[P, R]) -> Callable[P, R]:
+    """``function`` with the parts among its globals as numba can call them."""
+    assert isinstance(function, FunctionType)
+    known = function.__globals__
+    parts = {name: known[name] for name in function.__code__.co_names if isinstance(known.get(name), Part)}
+    if not parts:
+        return function
+    inner = {name: found.inner for name, found in parts.items()}
+    bound = FunctionType(function.__code__, known | inner, function.__name__, function.__defaults__)
+    bound.__qualname__, bound.__module__ = function.__qualname__, function.__module__
+    return bound
 
 
 @contextmanager
@@ -70,38 +117,41 @@ def _deferred_interrupt() -> Iterator[None]:
             raise KeyboardInterrupt
 
 
-def kernel(signature: str) -> Callable[[Callable[P, R]], Kernel[P, R]]:
+def kernel(signature: str, *, fast: bool = False) -> Callable[[Callable[P, R]], Kernel[P, R]]:
     """Mark a function as a kernel of the given signature, such as ``"bool(matrix, vector, float, out_vector)"``.
 
-    ``vector`` and ``matrix`` are float64 arrays of any memory order, read-only ones included; the kernel writes only
-    to an ``out_`` argument. One signature means one compilation, at a time of the caller's choosing.
+    ``vector`` and ``matrix`` are float64 arrays of any memory order, read-only ones included, ``ints`` an int64 array;
+    the kernel writes only to an ``out_`` argument. One signature means one compilation, at a time of the caller's
+    choosing. fast: sums may be reordered, as they may in every :func:`part`.
     """
-    return lambda function: Kernel(function, signature)
+    return lambda function: Kernel(function, signature, fast)
 
 
 def _numba_type(name: str) -> Any:
     from numba import types
 
-    arrays = {"vector": 1, "matrix": 2}
+    arrays = {"vector": (types.float64, 1), "matrix": (types.float64, 2), "ints": (types.int64, 1)}
     bare = name.removeprefix("out_")
     if bare in arrays:
-        return types.Array(types.float64, arrays[bare], "A", readonly=bare == name)
+        return types.Array(*arrays[bare], "A", readonly=bare == name)
     return {"float": types.float64, "int": types.int64, "bool": types.boolean, "void": types.void}[name]
 
 
-def _compile(function: Callable[P, R], signature: str) -> Callable[P, R]:
+def _compile(kernel: Kernel[P, R]) -> Callable[P, R]:
     import numba
 
-    returned, _, arguments = signature.rstrip(")").partition("(")
+    returned, _, arguments = kernel.signature.rstrip(")").partition("(")
     types = _numba_type(returned)(*(_numba_type(name.strip()) for name in arguments.split(",")))
+    function = _with_parts(kernel.function)
+    options = {"error_model": "numpy", "fastmath": _FAST if kernel.fast else False}
     folder = cache_folder()
     if folder is None:
-        return numba.njit(types, error_model="numpy")(function)  # type: ignore[no-any-return]
+        return numba.njit(types, **options)(function)  # type: ignore[no-any-return]
     # numba reads the folder while it decorates; the setting is global, so it is put back for the caller's own functions
     before = numba.config.CACHE_DIR
     numba.config.CACHE_DIR = str(folder)
     try:
-        return numba.njit(types, cache=True, error_model="numpy")(function)  # type: ignore[no-any-return]
+        return numba.njit(types, cache=True, **options)(function)  # type: ignore[no-any-return]
     finally:
         numba.config.CACHE_DIR = before
 

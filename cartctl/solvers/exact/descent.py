@@ -1,0 +1,135 @@
+"""The dual active-set method of Goldfarb & Idnani (1983) for the point of least norm.
+
+It starts from the least norm on the equalities alone, takes in the inequality missed by most, and lets go of members
+whose multiplier would turn negative. Where the newcomer depends on the members and none can go, the inequalities
+contradict each other at this scale: ``n_e = sum_j r_j n_j`` is the proof, left in the working set's ``r``.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cartctl.checks import FloatArray
+from cartctl.kernels import part
+from cartctl.solvers.exact.inequalities import (
+    MEMBER,
+    OUT,
+    Inequalities,
+    drop,
+    most_violated,
+    normal_of,
+    right_side,
+)
+from cartctl.solvers.exact.working_set import FIXED, FREE, WorkingSet, append, combine, place
+
+SETTLED, STALLED = -1, -2  # else the code of the inequality that cannot be met at this scale
+
+DEPENDENT = 1e-11  # of a unit normal: what is left of it is round-off
+SMALL = 1e-11  # of the largest coefficient of a combination
+_CLEARLY = 1e-6  # of a unit normal: a guess that adds less is left out
+_LEAST = 1e-3  # coefficients below this are not what others are compared with
+
+
+@part
+def settle(w: WorkingSet, q: Inequalities, u: FloatArray, s: float, most: int) -> int:
+    """Make u the point of least norm on the members within all inequalities; SETTLED, STALLED or a code."""
+    shed_negative(w, q)
+    for _ in range(most):
+        place(w, u)
+        code = most_violated(q, u)
+        if code < 0:
+            return SETTLED
+        outcome = _take_in(w, q, code, u, s, most)
+        if outcome != SETTLED:
+            return outcome
+    return STALLED
+
+
+@part
+def shed_negative(w: WorkingSet, q: Inequalities) -> None:
+    """Let go of free members until no multiplier is negative, so that the dual method may start."""
+    while w.num[0] > 0:
+        combine(w, w.g, w.lam)
+        worst, found = 0.0, -1
+        for j in range(w.num[0]):
+            if w.kind[j] == FREE and w.lam[j] < worst:
+                worst, found = w.lam[j], j
+        if found < 0:
+            return
+        drop(q, w, found)
+
+
+@part
+def load(w: WorkingSet, q: Inequalities, start: NDArray[np.int64], s: float) -> None:
+    """Take in a guess of the active inequalities, as far as it is independent; any guess is a valid start."""
+    for k in range(start.shape[0]):
+        code = start[k]
+        if code < 0 or code >> 1 >= q.state.shape[0] or q.state[code >> 1] != OUT or w.num[0] >= w.z.shape[0]:
+            continue
+        side = right_side(q, code)
+        if abs(side) == np.inf:
+            continue
+        left = normal_of(q, code, w)
+        if left > _CLEARLY:
+            append(w, code, FREE, left, side, 0.0, s)
+            q.state[code >> 1] = MEMBER
+
+
+@part
+def independence(w: WorkingSet) -> float:
+    """The norm above which what is left of a unit normal is more than the round-off of the members' own."""
+    least = 1.0
+    for j in range(w.num[0]):
+        least = min(least, w.R[j, j])
+    return min(1e-7, max(DEPENDENT, 1e-15 / least))
+
+
+@part
+def largest_coefficient(w: WorkingSet) -> float:
+    """The size that coefficients of inequalities in ``r`` are compared with."""
+    largest = _LEAST
+    for j in range(w.num[0]):
+        if w.kind[j] != FIXED:
+            largest = max(largest, abs(w.r[j]))
+    return largest
+
+
+@part
+def _take_in(w: WorkingSet, q: Inequalities, code: int, u: FloatArray, s: float, most: int) -> int:
+    """Make the violated inequality a member, dropping those in its way."""
+    side = right_side(q, code)
+    n = w.Q.shape[1]
+    combine(w, w.g, w.lam)
+    for _ in range(most):
+        left = normal_of(q, code, w)
+        combine(w, w.h, w.r)
+        floor = SMALL * largest_coefficient(w)
+        blocking, first = -1, np.inf
+        for j in range(w.num[0]):
+            if w.kind[j] == FREE and w.r[j] > floor:
+                step = max(w.lam[j], 0.0) / w.r[j]
+                if step < first:
+                    blocking, first = j, step
+        dependent = w.num[0] >= n or left < independence(w)
+        if dependent:
+            if blocking < 0:
+                return code
+        else:
+            missing = side
+            for i in range(w.num[0]):  # n_e . u, the gap along what is left of the normal
+                missing -= w.h[i] * w.g[i]
+            x = 0.0
+            for k in range(n):
+                x += w.z[k] * u[k]
+            full = (missing - x) / (left * left)
+            if full <= first:
+                append(w, code, FREE, left, side, 0.0, s)
+                q.state[code >> 1] = MEMBER
+                return SETTLED
+            for k in range(n):
+                u[k] += first * w.z[k]
+        for j in range(w.num[0]):
+            w.lam[j] -= first * w.r[j]
+        drop(q, w, blocking)
+    return STALLED

@@ -1,0 +1,197 @@
+"""One fitted level: least ``sum_i dist(a_i . u, [low_i, high_i])^2`` under all that is in force, by a primal method.
+
+Among the inequalities that hold with equality (the members), the step p is the least-squares one for the rows that
+miss their interval: ``p = (A_V N)# (target - A_V u)`` in the members' null space, as far as the first inequality in its
+way and to the lowest point of the sum, which is quadratic by pieces. At rest, ``A_V^T (A_V u - target) = sum_j lam_j n_j``;
+a member with lam_j < 0 is let go. Rows that miss in the end are equations from then on (how much they miss is the same
+in every optimum), as are members with lam_j > 0; rows that are met go on as inequalities.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from cartctl.checks import FloatArray
+from cartctl.kernels import part
+from cartctl.solvers.exact.descent import STALLED
+from cartctl.solvers.exact.inequalities import MEMBER, Inequalities, drop, normal_of, right_side
+from cartctl.solvers.exact.line_search import blocked_at, lowest_at
+from cartctl.solvers.exact.proof import write_multipliers
+from cartctl.solvers.exact.rows import Equations
+from cartctl.solvers.exact.scaled import MET
+from cartctl.solvers.exact.working_set import FREE, WorkingSet, append, combine, orthogonalise
+
+_NOISE = 1e-9  # of the rows' size: singular values below this lead nowhere
+_REST = 1e-11  # of the largest miss: a step that changes the rows by less is none
+_ROUND_OFF = 1e-14  # of what is added up in a row: a miss below this is none
+_PULLS = 1e-10  # of the rows' size times the largest miss: a multiplier below this is none
+
+
+@part
+def fitted_level(
+    w: WorkingSet,
+    q: Inequalities,
+    rows: FloatArray,
+    low: FloatArray,
+    high: FloatArray,
+    size: float,
+    norm: FloatArray,
+    proof: FloatArray,
+    u: FloatArray,
+    most: int,
+) -> tuple[int, bool]:
+    """Move u, which is feasible, to an optimum: outcome, and whether the rows have lost rank."""
+    m, n = rows.shape
+    miss = np.empty(m)
+    p = np.empty(n)
+    gradient = np.empty(n)
+    lost = False
+    for turn in range(most):
+        count = misses(rows, low, high, u, size, miss)
+        rank = _step(w, rows, miss, count, size, p)
+        if turn == 0:
+            lost = rank < min(m, n)
+        largest = _largest(rows, low, high, u, size, miss)
+        if _moves(rows, p, largest, _ROUND_OFF * size * _length(u)):
+            most_far, code = blocked_at(q, w, u, p)
+            far = lowest_at(rows, low, high, u, p, most_far)
+            for k in range(n):
+                u[k] += far * p[k]
+            if far >= most_far and code >= 0:
+                left = normal_of(q, code, w)
+                append(w, code, FREE, left, right_side(q, code), 0.0, 0.0)
+                q.state[code >> 1] = MEMBER
+            continue
+        _slope(rows, miss, gradient)
+        weakest = _multipliers(w, gradient, _PULLS * size * largest)
+        if weakest < 0:
+            write_multipliers(w, q, norm, proof)
+            return MET, lost
+        drop(q, w, weakest)
+    return STALLED, lost
+
+
+@part
+def misses(rows: FloatArray, low: FloatArray, high: FloatArray, u: FloatArray, size: float, miss: FloatArray) -> int:
+    """What is missing from each row to its interval, signed, 0 inside; how many rows count."""
+    count = 0
+    for i in range(rows.shape[0]):
+        x = 0.0
+        for k in range(rows.shape[1]):
+            x += rows[i, k] * u[k]
+        if low[i] == high[i]:
+            miss[i] = low[i] - x
+            count += 1
+        elif x < low[i]:
+            miss[i] = low[i] - x
+            count += 1
+        elif x > high[i]:
+            miss[i] = high[i] - x
+            count += 1
+        else:
+            miss[i] = 0.0
+    return count
+
+
+@part
+def _step(w: WorkingSet, rows: FloatArray, miss: FloatArray, count: int, size: float, p: FloatArray) -> int:
+    """The shortest least-squares step inside the members' null space; the rank of the rows there."""
+    m, n = rows.shape
+    for k in range(n):
+        p[k] = 0.0
+    if count == 0 or size == 0.0:
+        return 0
+    B = np.zeros((m, n))
+    for i in range(m):
+        if miss[i] == 0.0 and count < m:
+            continue
+        t = 0.0
+        for k in range(n):
+            w.z[k] = rows[i, k]
+            t += rows[i, k] * rows[i, k]
+        orthogonalise(w, math.sqrt(t))
+        for k in range(n):
+            B[i, k] = w.z[k]
+    U, s, Vt = np.linalg.svd(B, full_matrices=False)
+    rank = 0
+    for j in range(s.shape[0]):
+        if s[j] <= _NOISE * size:
+            break
+        rank += 1
+        t = 0.0
+        for i in range(m):
+            t += U[i, j] * miss[i]
+        t /= s[j]
+        for k in range(n):
+            p[k] += t * Vt[j, k]
+    for k in range(n):
+        w.z[k] = p[k]
+    orthogonalise(w, 0.0)
+    for k in range(n):
+        p[k] = w.z[k]
+    return rank
+
+
+@part
+def _largest(
+    rows: FloatArray, low: FloatArray, high: FloatArray, u: FloatArray, size: float, miss: FloatArray
+) -> float:
+    """The largest miss; round-off is set to zero."""
+    largest = 0.0
+    for i in range(rows.shape[0]):
+        total = 0.0
+        for k in range(rows.shape[1]):
+            total += abs(rows[i, k] * u[k])
+        if abs(miss[i]) <= 10.0 * _ROUND_OFF * (total + abs(miss[i] + total)):
+            miss[i] = 0.0
+        largest = max(largest, abs(miss[i]))
+    return largest
+
+
+@part
+def _length(u: FloatArray) -> float:
+    """The largest entry."""
+    largest = 0.0
+    for k in range(u.shape[0]):
+        largest = max(largest, abs(u[k]))
+    return largest
+
+
+@part
+def _moves(rows: FloatArray, p: FloatArray, largest: float, round_off: float) -> bool:
+    """Whether the step changes what the rows miss by more than round-off."""
+    change = 0.0
+    for i in range(rows.shape[0]):
+        x = 0.0
+        for k in range(rows.shape[1]):
+            x += rows[i, k] * p[k]
+        change = max(change, abs(x))
+    return largest > 0.0 and change > max(_REST * largest, round_off)
+
+
+@part
+def _slope(rows: FloatArray, miss: FloatArray, gradient: FloatArray) -> None:
+    """``A_V^T (A_V u - target)``."""
+    for k in range(rows.shape[1]):
+        t = 0.0
+        for i in range(rows.shape[0]):
+            t -= rows[i, k] * miss[i]
+        gradient[k] = t
+
+
+@part
+def _multipliers(w: WorkingSet, gradient: FloatArray, nothing: float) -> int:
+    """The gradient as a combination of the members, into lam; the free one that pulls away most, or -1."""
+    for k in range(gradient.shape[0]):
+        w.z[k] = gradient[k]
+    orthogonalise(w, np.inf)
+    combine(w, w.h, w.lam)
+    worst, found = 0.0, -1
+    for j in range(w.num[0]):
+        if abs(w.lam[j]) <= nothing:
+            w.lam[j] = 0.0
+        elif w.kind[j] == FREE and w.lam[j] < worst:
+            worst, found = w.lam[j], j
+    return found

@@ -1,0 +1,203 @@
+"""The levels in order of priority, and then the point of least norm: one compiled call.
+
+Problem: rows ``A u + d = s b`` (scaled), ``A u + d = b`` (fitted) or ``c_lower <= C u <= c_upper`` at a level of their own
+(kept, or missed by as little as possible), a box, hard rows C, and the reference u0 from which the norm is measured.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cartctl.checks import FloatArray
+from cartctl.kernels import kernel, part
+from cartctl.solvers.exact.by_levels import by_levels
+from cartctl.solvers.exact.inequalities import Inequalities, most_violated, row_norms
+from cartctl.solvers.exact.kinds import FITTED, GENERAL, INTERVAL, SCALED
+from cartctl.solvers.exact.proof import write_multipliers
+from cartctl.solvers.exact.rows import Equations, task_size
+from cartctl.solvers.exact.working_set import FIXED, WorkingSet, append, combine, new_working_set, orthogonalise, place
+
+_DEPENDENT = 2e-8  # of a task's own size: rows this close to each other are left to the levels
+_COARSE = 1e-2  # of the size that commands alone suggest for u: what round-off in them is relative to
+
+
+@kernel(
+    "int(matrix, vector, vector, ints, ints, vector, vector, vector, matrix, vector, vector, vector, ints, "
+    "out_vector, out_vector, out_ints, out_matrix)",
+    fast=True,
+)
+def lexicographic(
+    A_: FloatArray,
+    b: FloatArray,
+    d: FloatArray,
+    sizes: NDArray[np.int64],
+    fits: NDArray[np.int64],
+    scale: FloatArray,
+    lower: FloatArray,
+    upper: FloatArray,
+    C_: FloatArray,
+    c_lower: FloatArray,
+    c_upper: FloatArray,
+    reference: FloatArray,
+    start: NDArray[np.int64],
+    u: FloatArray,
+    scales: FloatArray,
+    active: NDArray[np.int64],
+    proofs: FloatArray,
+) -> int:
+    """Fill u (n,), scales (p,), active (count, then codes) and, if given room, proofs (p + 1, M + n + r); flags.
+
+    sizes, fits, scale: rows, kind and natural norm (0: that of A) of each level. d, reference, lower and upper may be
+    empty. Rows of interval levels are the last ones of C, in order. start: codes of inequalities to begin with.
+    """
+    n, M, p = u.shape[0], A_.shape[0], sizes.shape[0]
+    w = new_working_set(n)
+    e, q = _arrays(A_, b, d, fits, sizes, lower, upper, C_, c_lower, c_upper, reference, n)
+    soft = 0
+    for k in range(p):
+        if fits[k] == INTERVAL:
+            soft += sizes[k]
+    most = 50 + 10 * (n + M + q.norm.shape[0])
+    flags = 0
+    members = 0
+    done = False
+    if soft == 0 and M <= n:
+        done, members = _all_at_once(w, q, e, sizes, scale, u, proofs)
+        for k in range(p):
+            scales[k] = 1.0
+    if not done:
+        flags = GENERAL | by_levels(w, q, e, sizes, fits, scale, members, start, u, scales, proofs, most)
+    active[0] = 0
+    for j in range(w.num[0]):
+        if w.who[j] >= 0:
+            active[0] += 1
+            active[active[0]] = w.who[j]
+    for i in range(n):
+        x = min(max(u[i], q.lower[i]), q.upper[i])
+        if reference.shape[0] > 0:
+            x += reference[i]
+            if lower.shape[0] > 0:
+                x = max(x, lower[i])
+            if upper.shape[0] > 0:
+                x = min(x, upper[i])
+        u[i] = x
+    return flags
+
+
+@part
+def _arrays(
+    A_: FloatArray,
+    b: FloatArray,
+    d: FloatArray,
+    fits: NDArray[np.int64],
+    sizes: NDArray[np.int64],
+    lower: FloatArray,
+    upper: FloatArray,
+    C_: FloatArray,
+    c_lower: FloatArray,
+    c_upper: FloatArray,
+    reference: FloatArray,
+    n: int,
+) -> tuple[Equations, Inequalities]:
+    """Contiguous copies, relative to the reference, with their norms."""
+    M, r = A_.shape[0], C_.shape[0]
+    block = np.empty((M + r, n))
+    lines = np.zeros((3, M + n + r))
+    more = np.zeros((3, n + r))
+    A, C = block[:M], block[M:]
+    norm, base, slope = lines[0, :M], lines[1, :M], lines[2, :M]
+    low, high, c_norm = more[0, :n], more[1, :n], lines[0, M : M + r]
+    c_low, c_high = more[0, n:], more[1, n:]
+    shifted = reference.shape[0] > 0
+    unit = more[2, :1]
+    row = 0
+    for k in range(sizes.shape[0]):
+        if fits[k] == INTERVAL:
+            continue
+        for i in range(row, row + sizes[k]):
+            base[i] = -d[i] if d.shape[0] > 0 else 0.0
+            if fits[k] == SCALED:
+                slope[i] = b[i]
+            else:
+                base[i] += b[i]
+        row += sizes[k]
+    for i in range(M):
+        t = 0.0
+        for k in range(n):
+            x = A_[i, k]
+            A[i, k] = x
+            t += x * x
+            if shifted:
+                base[i] -= x * reference[k]
+        norm[i] = math.sqrt(t)
+    for k in range(n):
+        low[k] = lower[k] if lower.shape[0] > 0 else -np.inf
+        high[k] = upper[k] if upper.shape[0] > 0 else np.inf
+        if shifted:
+            low[k] -= reference[k]
+            high[k] -= reference[k]
+            unit[0] = max(unit[0], abs(reference[k]))
+    for i in range(r):
+        c_low[i], c_high[i] = c_lower[i], c_upper[i]
+        t = 0.0
+        for k in range(n):
+            C[i, k] = C_[i, k]
+            if shifted:
+                t += C[i, k] * reference[k]
+        c_low[i] -= t
+        c_high[i] -= t
+    row_norms(C, c_norm)
+    row = 0
+    for k in range(sizes.shape[0]):
+        if fits[k] == INTERVAL:
+            continue
+        size, largest = 0.0, 0.0
+        for i in range(row, row + sizes[k]):
+            size = max(size, norm[i])
+            largest = max(largest, abs(base[i]) + abs(slope[i]))
+        row += sizes[k]
+        if size > 0.0:
+            unit[0] = max(unit[0], _COARSE * largest / size)
+    return Equations(A, norm, base, slope), Inequalities(
+        low, high, C, c_low, c_high, c_norm, unit, np.zeros(n + r, np.int64)
+    )
+
+
+@part
+def _all_at_once(
+    w: WorkingSet,
+    q: Inequalities,
+    e: Equations,
+    sizes: NDArray[np.int64],
+    natural: FloatArray,
+    u: FloatArray,
+    proofs: FloatArray,
+) -> tuple[bool, int]:
+    """The least norm on all equations at s = 1, if they are independent and it is inside: done, rows in the set."""
+    for i in range(u.shape[0]):
+        if q.lower[i] == q.upper[i]:
+            return False, 0
+    row = 0
+    for k in range(sizes.shape[0]):
+        size = task_size(e, row, row + sizes[k], natural[k])
+        for i in range(row, row + sizes[k]):
+            norm = e.norm[i]
+            if norm <= _DEPENDENT * size:
+                return False, i
+            for j in range(w.z.shape[0]):
+                w.z[j] = e.A[i, j] / norm
+            left = orthogonalise(w, 1.0)
+            if left * norm <= _DEPENDENT * size:
+                return False, i
+            append(w, -1 - i, FIXED, left, e.base[i] / norm, e.slope[i] / norm, 1.0)
+        row += sizes[k]
+    place(w, u)
+    if most_violated(q, u) >= 0:
+        return False, row
+    if proofs.shape[0] > 0:
+        combine(w, w.g, w.lam)
+        write_multipliers(w, q, e.norm, proofs[sizes.shape[0]])
+    return True, row

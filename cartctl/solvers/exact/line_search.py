@@ -1,0 +1,91 @@
+"""How far to go along a step: to the first inequality in the way, or to the lowest point of the misses."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cartctl.checks import FloatArray
+from cartctl.kernels import part
+from cartctl.solvers.exact.inequalities import OUT, Inequalities
+from cartctl.solvers.exact.working_set import WorkingSet
+
+_ALONG = 1e-12  # of the step: a component this small does not approach an inequality
+
+
+@part
+def blocked_at(q: Inequalities, w: WorkingSet, u: FloatArray, p: FloatArray) -> tuple[float, int]:
+    """The largest share of step p that keeps every inequality, and the code of the one that ends it (-1: none)."""
+    n = q.lower.shape[0]
+    size = 0.0
+    for k in range(n):
+        size = max(size, abs(p[k]))
+    far, code = np.inf, -1
+    for i in range(n + q.norm.shape[0]):
+        if q.state[i] != OUT:
+            continue
+        if i < n:
+            x, dx, low, high, length = u[i], p[i], q.lower[i], q.upper[i], 1.0
+        else:
+            r = i - n
+            length = q.norm[r]
+            low, high = q.c_lower[r], q.c_upper[r]
+            x, dx = 0.0, 0.0
+            for k in range(n):
+                x += q.C[r, k] * u[k]
+                dx += q.C[r, k] * p[k]
+        if dx < -_ALONG * size * length and (low - x) / dx < far:
+            far, code = max((low - x) / dx, 0.0), 2 * i
+        elif dx > _ALONG * size * length and (high - x) / dx < far:
+            far, code = max((high - x) / dx, 0.0), 2 * i + 1
+    return far, code
+
+
+@part
+def lowest_at(
+    rows: FloatArray, low: FloatArray, high: FloatArray, u: FloatArray, p: FloatArray, most: float
+) -> float:
+    """Where the sum of squared misses is least along u + far p, far in [0, most]."""
+    m, n = rows.shape
+    start, rate = np.zeros(m), np.zeros(m)
+    pieces = False
+    for i in range(m):
+        for k in range(n):
+            start[i] += rows[i, k] * u[k]
+            rate[i] += rows[i, k] * p[k]
+        pieces = pieces or low[i] != high[i]
+    if not pieces:
+        return min(1.0, most)
+    here = 0.0
+    for _ in range(2 * m + 2):
+        slope, bend, following = _piece(start, rate, low, high, here)
+        if slope >= 0.0:
+            return min(here, most)
+        if bend > 0.0 and here - slope / bend <= following:
+            return min(here - slope / bend, most)
+        if not following < most:
+            return min(most, following) if most < np.inf else here
+        here = following
+    return min(here, most)
+
+
+@part
+def _piece(
+    start: FloatArray, rate: FloatArray, low: FloatArray, high: FloatArray, here: float
+) -> tuple[float, float, float]:
+    """Slope and bend of half the sum just after ``here``, and where this piece ends."""
+    slope, bend, following = 0.0, 0.0, np.inf
+    for i in range(start.shape[0]):
+        x = start[i] + here * rate[i]
+        for side in range(2):
+            bound = low[i] if side == 0 else high[i]
+            if rate[i] != 0.0 and abs(bound) < np.inf:
+                crossing = (bound - start[i]) / rate[i]
+                if here < crossing < following:
+                    following = crossing
+        if x < low[i] or (x == low[i] and rate[i] < 0.0):
+            slope += (x - low[i]) * rate[i]
+            bend += rate[i] * rate[i]
+        elif x > high[i] or (x == high[i] and rate[i] > 0.0):
+            slope += (x - high[i]) * rate[i]
+            bend += rate[i] * rate[i]
+    return slope, bend, following

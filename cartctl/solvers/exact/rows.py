@@ -1,0 +1,113 @@
+"""Equation rows: taking them into the working set, and what a dependent row says about the scale."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from cartctl.checks import FloatArray
+from cartctl.kernels import part
+from cartctl.solvers.exact.proof import NOBODY, credit
+from cartctl.solvers.exact.inequalities import Inequalities
+from cartctl.solvers.exact.working_set import FIXED, WorkingSet, append, combine, orthogonalise, refill
+
+END = 1e-9  # s this far outside [0, 1] is round-off
+_DEPENDENT = 2e-8  # of the task's own size: what is left of a row is noise
+_SAME = 1e-8  # relative: sides that differ by less agree
+
+
+class Equations(NamedTuple):
+    """Rows ``A u = base + s slope``, the norm of each, and the size each task has by nature."""
+
+    A: FloatArray  # (M, n)
+    norm: FloatArray  # (M,)
+    base: FloatArray  # (M,)
+    slope: FloatArray  # (M,)
+
+
+@part
+def task_size(e: Equations, first: int, last: int, natural: float) -> float:
+    """The norm of a task's rows, or what it is by nature if that is more."""
+    t = 0.0
+    for i in range(first, last):
+        t += e.norm[i] * e.norm[i]
+    return max(math.sqrt(t), natural)
+
+
+@part
+def fix_rows(w: WorkingSet, e: Equations, first: int, last: int, size: float, u: FloatArray) -> None:
+    """Make equalities of what rows first..last are at u; those that depend on the members say nothing new."""
+    for i in range(first, last):
+        norm = e.norm[i]
+        if norm <= _DEPENDENT * size or w.num[0] >= u.shape[0]:
+            continue
+        x = 0.0
+        for k in range(u.shape[0]):
+            w.z[k] = e.A[i, k] / norm
+            x += w.z[k] * u[k]
+        left = orthogonalise(w, 1.0)
+        if left * norm > _DEPENDENT * size:
+            append(w, -1 - i, FIXED, left, x, 0.0, 0.0)
+
+
+@part
+def add_rows(
+    w: WorkingSet, q: Inequalities, e: Equations, first: int, last: int, size: float, proof: FloatArray
+) -> tuple[bool, float, int, bool]:
+    """Add rows first..last of one task of norm ``size``: possible, s, the row that pins s (or NOBODY), rank lost.
+
+    A row that depends on the members, ``n_i = sum_j r_j n_j``, reads ``s bt = at``: nothing where both are zero, no s
+    where only bt is; else s is pinned.
+    """
+    s, pin, lost = 1.0, NOBODY, False
+    largest = 0.0
+    for i in range(first, last):
+        largest = max(largest, abs(e.slope[i]))
+    for i in range(first, last):
+        norm = e.norm[i]
+        left = 0.0
+        if norm > _DEPENDENT * size:
+            for k in range(w.z.shape[0]):
+                w.z[k] = e.A[i, k] / norm
+            left = orthogonalise(w, 1.0)
+            if left * norm > _DEPENDENT * size and w.num[0] < w.z.shape[0]:
+                append(w, -1 - i, FIXED, left, e.base[i] / norm, e.slope[i] / norm, s)
+                continue
+            combine(w, w.h, w.r)
+        else:
+            norm = max(size, norm) if size > 0.0 else 1.0
+            for j in range(w.num[0]):
+                w.r[j] = 0.0
+        lost = True
+        at, bt = -e.base[i] / norm, e.slope[i] / norm
+        at_size, bt_size = abs(at), max(abs(bt), largest / norm)
+        for j in range(w.num[0]):
+            at += w.r[j] * w.c0[j]
+            bt -= w.r[j] * w.c1[j]
+            at_size = max(at_size, abs(w.r[j] * w.c0[j]), abs(w.g[j]))
+            bt_size = max(bt_size, abs(w.r[j] * w.c1[j]))
+        if abs(bt) <= _SAME * bt_size:
+            if abs(at) <= _SAME * max(at_size, bt_size):
+                continue
+            _prove_row(w, q, e, i, proof)
+            return False, math.nan, pin, lost
+        pinned = 0.0 if abs(at) <= _SAME * at_size else at / bt
+        if pinned < -END or pinned > 1.0 + END or (pin != NOBODY and abs(pinned - s) > _SAME):
+            _prove_row(w, q, e, i, proof)
+            return False, math.nan, pin, lost
+        if pin == NOBODY:
+            pin, s = -1 - i, min(1.0, max(0.0, pinned))
+            for j in range(w.num[0]):
+                w.y[j] = -w.r[j]
+            refill(w, s)
+    return True, s, pin, lost
+
+
+@part
+def _prove_row(w: WorkingSet, q: Inequalities, e: Equations, i: int, proof: FloatArray) -> None:
+    """The combination of members and row i that cancels."""
+    if proof.shape[0] == 0:
+        return
+    for j in range(w.num[0]):
+        credit(q, e.norm, w.who[j], -w.r[j], proof)
+    credit(q, e.norm, -1 - i, 1.0, proof)

@@ -1,0 +1,169 @@
+"""One scaled level: ``A u = base + s slope`` with s as large as possible in [0, 1], under all that is in force.
+
+s starts at 1. Where the inequalities contradict the equations, Farkas' lemma gives unit normals that cancel,
+``n_e + sum_j y_j n_j = 0`` with y_j >= 0 on inequalities, so that every s obeys
+``c_e + sum_j y_j (c0_j + s c1_j) <= 0``. s is cut down to where this holds; the inequalities in it are then met with
+equality whatever else happens (they are TIED), until a further cut replaces the proof. No cut possible: no s is
+feasible.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cartctl.checks import FloatArray
+from cartctl.kernels import part
+from cartctl.solvers.exact.descent import DEPENDENT, SMALL, STALLED, largest_coefficient, load, settle
+from cartctl.solvers.exact.inequalities import EQUAL, IMPLIED, MEMBER, OUT, Inequalities, drop, normal_of, right_side
+from cartctl.solvers.exact.proof import NOBODY, write_proof
+from cartctl.solvers.exact.rows import END, Equations, add_rows
+from cartctl.solvers.exact.working_set import FIXED, FREE, TIED, WorkingSet, append, combine, place, refill, remove
+
+MET, SKIPPED = 0, 1  # how a level went; or STALLED
+
+_NOTHING = 1e-13  # s below this is zero
+_WORSE = 10.0  # a normal with a share this large stands better outside the working set
+
+
+@part
+def scaled_level(
+    w: WorkingSet,
+    q: Inequalities,
+    e: Equations,
+    first: int,
+    last: int,
+    size: float,
+    members: int,
+    start: NDArray[np.int64],
+    proof: FloatArray,
+    u: FloatArray,
+    most: int,
+) -> tuple[int, float, bool]:
+    """Rows first..last, the first ``members`` of which are in the set already: outcome, s, whether rank was lost."""
+    possible, s, implied, lost = add_rows(w, q, e, first + members, last, size, proof)
+    if not possible:
+        return SKIPPED, math.nan, lost
+    pinned = implied != NOBODY
+    load(w, q, start, s)
+    code = STALLED
+    for _ in range(most):
+        code = settle(w, q, u, s, most)
+        if code < 0:
+            break
+        if pinned:
+            _prove_contradiction(w, q, e, code, implied, 0.0, proof)
+            return SKIPPED, math.nan, lost
+        possible, s, implied = _cut(w, q, e, code, implied, s, proof)
+        if not possible:
+            return SKIPPED, math.nan, lost
+        code = STALLED
+    if code == STALLED:
+        return STALLED, math.nan, lost
+    if implied != NOBODY:
+        write_proof(w, q, e.norm, implied, proof)
+    if s < _NOTHING and not pinned:
+        s = 0.0
+        refill(w, s)
+    _freeze(w, q, implied, first, s)
+    place(w, u)
+    return MET, s, lost
+
+
+@part
+def _cut(
+    w: WorkingSet, q: Inequalities, e: Equations, code: int, implied: int, s: float, proof: FloatArray
+) -> tuple[bool, float, int]:
+    """Lower s to where the inequality that contradicts the members can be met: possible, s, the implied code."""
+    leaving, share = -1, 0.0
+    if implied != NOBODY:
+        floor = SMALL * largest_coefficient(w)
+        for j in range(w.num[0]):
+            if w.kind[j] == TIED and w.r[j] > floor and w.r[j] > share * w.y[j]:
+                leaving, share = j, w.r[j] / w.y[j]
+    slope, size = 0.0, 0.0
+    for j in range(w.num[0]):
+        term = (share * w.y[j] - w.r[j]) * w.c1[j]
+        slope += term
+        size += abs(term)
+    if slope <= 1e-13 * size:
+        _prove_contradiction(w, q, e, code, implied, share, proof)
+        return False, s, implied
+    if leaving >= 0:  # the old proof is mixed in until its tightest member cancels; its implied one takes that place
+        drop(q, w, leaving)
+        left = normal_of(q, implied, w)
+        append(w, implied, TIED, left, right_side(q, implied), 0.0, s)
+        q.state[implied >> 1] = MEMBER
+        normal_of(q, code, w)
+        combine(w, w.h, w.r)  # afresh: updated from cut to cut, it would gather round-off
+    elif implied != NOBODY:
+        q.state[implied >> 1] = OUT
+    floor = SMALL * largest_coefficient(w)
+    constant, slope = right_side(q, code), 0.0
+    for j in range(w.num[0]):
+        constant -= w.r[j] * w.c0[j]
+        slope -= w.r[j] * w.c1[j]
+        w.y[j] = -w.r[j]
+        if w.kind[j] != FIXED:
+            w.kind[j] = TIED if w.y[j] > floor else FREE
+            if w.kind[j] == FREE:
+                w.y[j] = 0.0
+    if not slope > 0.0 or constant > END * slope:
+        write_proof(w, q, e.norm, code, proof)
+        return False, s, code
+    s = max(min(s, -constant / slope), 0.0)
+    q.state[code >> 1] = IMPLIED
+    refill(w, s)
+    return True, s, code
+
+
+@part
+def _prove_contradiction(
+    w: WorkingSet, q: Inequalities, e: Equations, code: int, implied: int, share: float, proof: FloatArray
+) -> None:
+    """The proof that no s will do: the new contradiction plus so much of the old proof that s cancels."""
+    if proof.shape[0] == 0:
+        return
+    if implied != NOBODY:
+        rising = 0.0 if implied >= 0 else e.slope[-1 - implied] / e.norm[-1 - implied]
+        falling = 0.0
+        for j in range(w.num[0]):
+            rising += w.y[j] * w.c1[j]
+            falling += w.r[j] * w.c1[j]
+        if rising != 0.0:
+            share = falling / rising
+        write_proof(w, q, e.norm, implied, proof)
+        for i in range(proof.shape[0]):
+            proof[i] *= share
+    for j in range(w.num[0]):
+        w.y[j] = -w.r[j]
+    write_proof(w, q, e.norm, code, proof)
+
+
+@part
+def _freeze(w: WorkingSet, q: Inequalities, implied: int, first: int, s: float) -> None:
+    """Make equalities of what the scale depends on; the implied one changes places with a worse conditioned member."""
+    found = -1
+    if implied >= 0:
+        q.state[implied >> 1] = EQUAL
+        worst = _WORSE
+        for j in range(w.num[0]):
+            own = w.kind[j] == TIED or w.who[j] < -first
+            if own and abs(w.y[j]) > worst:
+                worst, found = abs(w.y[j]), j
+    for j in range(w.num[0]):
+        if w.kind[j] == TIED:
+            w.kind[j] = FIXED
+            q.state[w.who[j] >> 1] = EQUAL
+    if found >= 0:
+        remove(w, found)
+        left = normal_of(q, implied, w)
+        if left > DEPENDENT:
+            append(w, implied, FIXED, left, right_side(q, implied), 0.0, s)
+    for j in range(w.num[0]):
+        w.c0[j] += s * w.c1[j]
+        w.c1[j] = 0.0
+        w.y[j] = 0.0
+    refill(w, 0.0)
