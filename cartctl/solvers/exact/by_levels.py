@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from cartctl.checks import FloatArray
 from cartctl.kernels import part
 from cartctl.solvers.exact.descent import SETTLED, load, settle
-from cartctl.solvers.exact.fitted import fitted_level, misses
+from cartctl.solvers.exact.fitted import fitted_level
 from cartctl.solvers.exact.inequalities import EQUAL, OUT, SILENT, Inequalities, drop_all_free, normal_of
 from cartctl.solvers.exact.kinds import FITTED, INTERVAL, LOST_RANK, RELAXED, SCALED, STUCK
 from cartctl.solvers.exact.proof import write_multipliers
@@ -19,6 +19,11 @@ from cartctl.solvers.exact.scaled import MET, scaled_level
 from cartctl.solvers.exact.working_set import (
     FIXED,
     FREE,
+    KIND,
+    LAM,
+    NUM,
+    WHO,
+    G,
     WorkingSet,
     append,
     combine,
@@ -48,38 +53,32 @@ def by_levels(
     """Fill u, scales and proofs; flags. The first ``members`` rows may be in the set already."""
     n, p = u.shape[0], sizes.shape[0]
     saved, states = new_working_set(n), np.empty(q.state.shape[0], np.int64)
-    nothing = np.empty(0)
     flags = 0
-    hard = q.norm.shape[0]
-    for k in range(p):
-        if fits[k] == INTERVAL:
-            hard -= sizes[k]
+    begin, hard = _beginnings(sizes, fits, q.C.shape[0])
     for i in range(n + hard, q.state.shape[0]):
         q.state[i] = SILENT
     if p > 0 and fits[0] == SCALED and 0 < sizes[0] <= members:
         members = sizes[0]
-        w.num[0] = members
+        w.K[NUM, 0] = members
     else:
         members = 0
-        w.num[0] = 0
+        w.K[NUM, 0] = 0
         _lock(w, q)
-    row, soft, k = 0, hard, 0
-    settled, feasible = False, hard == 0
+    k, settled, feasible = 0, False, hard == 0
     while k < p:
+        first, last = begin[k], begin[k] + sizes[k]
         drop_all_free(q, w)
         if members > 0:
-            saved.num[0] = 0
+            saved.K[NUM, 0] = 0
         else:
             copy_members(w, saved)
         for i in range(q.state.shape[0]):
             states[i] = q.state[i]
-        proof = proofs[k] if proofs.shape[0] > 0 else nothing
+        proof = proofs[min(k, proofs.shape[0] - 1)]
         scales[k] = 1.0
         if fits[k] == SCALED:
-            size = task_size(e, row, row + sizes[k], natural[k])
-            outcome, scales[k], lost = scaled_level(
-                w, q, e, row, row + sizes[k], size, members, start, proof, u, most
-            )
+            size = task_size(e, first, last, natural[k])
+            outcome, scales[k], lost = scaled_level(w, q, e, first, last, size, members, start, proof, u, most)
             settled = outcome == MET
         else:
             load(w, q, start, 1.0)
@@ -88,27 +87,17 @@ def by_levels(
             if code != SETTLED:
                 outcome, lost = code, False
             elif fits[k] == FITTED:
-                size = task_size(e, row, row + sizes[k], natural[k])
-                outcome, lost = fitted_level(
-                    w,
-                    q,
-                    e.A[row : row + sizes[k]],
-                    e.base[row : row + sizes[k]],
-                    e.base[row : row + sizes[k]],
-                    size,
-                    e.norm,
-                    proof,
-                    u,
-                    most,
-                )
+                size = task_size(e, first, last, natural[k])
+                target = e.base[first:last]
+                outcome, lost = fitted_level(w, q, e.A[first:last], target, target, size, e.norm, proof, u, most)
                 if outcome == MET:
                     _press(w, q)
-                    fix_rows(w, e, row, row + sizes[k], size, u)
+                    fix_rows(w, e, first, last, size, u)
             else:
-                outcome, lost = _keep_interval(w, q, soft, soft + sizes[k], e.norm, proof, u, most)
+                outcome, lost = _keep_interval(w, q, first, last, e.norm, proof, u, most)
                 if outcome == MET:
                     _press(w, q)
-                    _settle_interval(w, q, soft, soft + sizes[k], u, hard)
+                    _settle_interval(w, q, first, last, u)
         members = 0
         if lost:
             flags |= LOST_RANK
@@ -129,10 +118,6 @@ def by_levels(
             if outcome < 0:
                 flags |= STUCK
         feasible = feasible or outcome == MET
-        if fits[k] == INTERVAL:
-            soft += sizes[k]
-        else:
-            row += sizes[k]
         k += 1
     if not settled:
         drop_all_free(q, w)
@@ -145,29 +130,47 @@ def by_levels(
             code = settle(w, q, u, 1.0, most)
         if code != SETTLED:
             flags |= STUCK
-    if proofs.shape[0] > 0:
-        combine(w, w.g, w.lam)
+    if proofs.shape[1] > 0:
+        combine(w, w.V[G], w.V[LAM])
         write_multipliers(w, q, e.norm, proofs[p])
     return flags
 
 
 @part
+def _beginnings(sizes: NDArray[np.int64], fits: NDArray[np.int64], rows: int) -> tuple[NDArray[np.int64], int]:
+    """The first row of each level, in the equations or in C; how many rows of C are hard."""
+    begin = np.empty(sizes.shape[0], np.int64)
+    hard = rows
+    for k in range(sizes.shape[0]):
+        if fits[k] == INTERVAL:
+            hard -= sizes[k]
+    row, soft = 0, hard
+    for k in range(sizes.shape[0]):
+        begin[k] = soft if fits[k] == INTERVAL else row
+        if fits[k] == INTERVAL:
+            soft += sizes[k]
+        else:
+            row += sizes[k]
+    return begin, hard
+
+
+@part
 def _lock(w: WorkingSet, q: Inequalities) -> None:
     """Joints with one value are equalities from the start."""
-    for i in range(q.lower.shape[0]):
-        if q.lower[i] == q.upper[i]:
+    for i in range(w.Q.shape[1]):
+        if q.B[0, i] == q.B[1, i]:
             left = normal_of(q, 2 * i, w)
-            append(w, 2 * i, FIXED, left, q.lower[i], 0.0, 0.0)
+            append(w, 2 * i, left, q.B[0, i], 0.0, 0.0)
             q.state[i] = EQUAL
 
 
 @part
 def _press(w: WorkingSet, q: Inequalities) -> None:
     """Inequalities that a fit presses against are equalities from then on; the others leave."""
-    for j in range(w.num[0]):
-        if w.kind[j] == FREE and w.lam[j] > 0.0:
-            w.kind[j] = FIXED
-            q.state[w.who[j] >> 1] = EQUAL
+    for j in range(w.K[NUM, 0]):
+        if w.K[KIND, j] == FREE and w.V[LAM, j] > 0.0:
+            w.K[KIND, j] = FIXED
+            q.state[w.K[WHO, j] >> 1] = EQUAL
     drop_all_free(q, w)
 
 
@@ -183,37 +186,36 @@ def _keep_interval(
     most: int,
 ) -> tuple[int, bool]:
     """Rows first..last of C missed by as little as possible."""
-    size = 0.0
+    n, size = u.shape[0], 0.0
     for r in range(first, last):
-        size += q.norm[r] * q.norm[r]
-    outcome, _ = fitted_level(
-        w, q, q.C[first:last], q.c_lower[first:last], q.c_upper[first:last], math.sqrt(size), norm, proof, u, most
-    )
+        size += q.norm[n + r] * q.norm[n + r]
+    low, high = q.B[0, n + first : n + last], q.B[1, n + first : n + last]
+    outcome, _ = fitted_level(w, q, q.C[first:last], low, high, math.sqrt(size), norm, proof, u, most)
     return outcome, False
 
 
 @part
-def _settle_interval(w: WorkingSet, q: Inequalities, first: int, last: int, u: FloatArray, hard: int) -> None:
+def _settle_interval(w: WorkingSet, q: Inequalities, first: int, last: int, u: FloatArray) -> None:
     """Rows that are met go on as inequalities, rows that are missed as equalities."""
     n = u.shape[0]
     for r in range(first, last):
         x, miss = _miss(q, r, u)
-        if abs(miss) <= _MISSED * max(abs(x), q.norm[r] * q.unit[0]):
+        if abs(miss) <= _MISSED * max(abs(x), q.norm[n + r] * q.norm[q.state.shape[0]]):
             q.state[n + r] = OUT
             continue
         left = normal_of(q, 2 * (n + r), w)
-        if w.num[0] < n and left > _MISSED:
-            append(w, 2 * (n + r), FIXED, left, x / q.norm[r], 0.0, 0.0)
+        if w.K[NUM, 0] < n and left > _MISSED:
+            append(w, 2 * (n + r), left, x / q.norm[n + r], 0.0, 0.0)
         q.state[n + r] = EQUAL
 
 
 @part
 def _miss(q: Inequalities, r: int, u: FloatArray) -> tuple[float, float]:
     """Row r at u, and how far it is from its interval."""
-    x = 0.0
-    for k in range(u.shape[0]):
+    n, x = u.shape[0], 0.0
+    for k in range(n):
         x += q.C[r, k] * u[k]
-    return x, min(x - q.c_lower[r], 0.0) + max(x - q.c_upper[r], 0.0)
+    return x, min(x - q.B[0, n + r], 0.0) + max(x - q.B[1, n + r], 0.0)
 
 
 @part
@@ -223,11 +225,11 @@ def _relax(w: WorkingSet, q: Inequalities, hard: int, norm: FloatArray, u: Float
     for r in range(hard):
         q.state[n + r] = SILENT
     settle(w, q, u, 1.0, most)
-    _keep_interval(w, q, 0, hard, norm, np.empty(0), u, most)
+    _keep_interval(w, q, hard - hard, hard, norm, np.empty(0), u, most)
     drop_all_free(q, w)
     for r in range(hard):
         x, _ = _miss(q, r, u)
-        slack = _SLACK * max(abs(x), q.norm[r] * q.unit[0], 1e-3 * q.norm[r])
-        q.c_lower[r] = min(q.c_lower[r], x - slack)
-        q.c_upper[r] = max(q.c_upper[r], x + slack)
+        slack = _SLACK * max(abs(x), q.norm[n + r] * max(q.norm[q.state.shape[0]], 1e-3))
+        q.B[0, n + r] = min(q.B[0, n + r], x - slack)
+        q.B[1, n + r] = max(q.B[1, n + r], x + slack)
         q.state[n + r] = OUT

@@ -13,15 +13,15 @@ from numpy.typing import NDArray
 from cartctl.checks import FloatArray
 from cartctl.kernels import part
 from cartctl.solvers.exact.inequalities import (
-    MEMBER,
     OUT,
     Inequalities,
     drop,
     most_violated,
     normal_of,
     right_side,
+    take_in,
 )
-from cartctl.solvers.exact.working_set import FIXED, FREE, WorkingSet, append, combine, place
+from cartctl.solvers.exact.working_set import FIXED, FREE, KIND, LAM, NUM, SUM, G, H, WorkingSet, Z, combine, place
 
 SETTLED, STALLED = -1, -2  # else the code of the inequality that cannot be met at this scale
 
@@ -40,7 +40,7 @@ def settle(w: WorkingSet, q: Inequalities, u: FloatArray, s: float, most: int) -
         code = most_violated(q, u)
         if code < 0:
             return SETTLED
-        outcome = _take_in(w, q, code, u, s, most)
+        outcome = _bring_in(w, q, code, u, s, most)
         if outcome != SETTLED:
             return outcome
     return STALLED
@@ -49,15 +49,22 @@ def settle(w: WorkingSet, q: Inequalities, u: FloatArray, s: float, most: int) -
 @part
 def shed_negative(w: WorkingSet, q: Inequalities) -> None:
     """Let go of free members until no multiplier is negative, so that the dual method may start."""
-    while w.num[0] > 0:
-        combine(w, w.g, w.lam)
-        worst, found = 0.0, -1
-        for j in range(w.num[0]):
-            if w.kind[j] == FREE and w.lam[j] < worst:
-                worst, found = w.lam[j], j
+    while w.K[NUM, 0] > 0:
+        combine(w, w.V[G], w.V[LAM])
+        found = most_negative(w)
         if found < 0:
             return
         drop(q, w, found)
+
+
+@part
+def most_negative(w: WorkingSet) -> int:
+    """The free member of the most negative multiplier, -1 where there is none."""
+    worst, found = 0.0, -1
+    for j in range(w.K[NUM, 0]):
+        if w.K[KIND, j] == FREE and w.V[LAM, j] < worst:
+            worst, found = w.V[LAM, j], j
+    return found
 
 
 @part
@@ -65,22 +72,20 @@ def load(w: WorkingSet, q: Inequalities, start: NDArray[np.int64], s: float) -> 
     """Take in a guess of the active inequalities, as far as it is independent; any guess is a valid start."""
     for k in range(start.shape[0]):
         code = start[k]
-        if code < 0 or code >> 1 >= q.state.shape[0] or q.state[code >> 1] != OUT or w.num[0] >= w.z.shape[0]:
+        if code < 0 or code >> 1 >= q.state.shape[0] or q.state[code >> 1] != OUT or w.K[NUM, 0] >= w.Q.shape[1]:
             continue
-        side = right_side(q, code)
-        if abs(side) == np.inf:
+        if abs(right_side(q, code)) == np.inf:
             continue
         left = normal_of(q, code, w)
         if left > _CLEARLY:
-            append(w, code, FREE, left, side, 0.0, s)
-            q.state[code >> 1] = MEMBER
+            take_in(q, w, code, left, s)
 
 
 @part
 def independence(w: WorkingSet) -> float:
     """The norm above which what is left of a unit normal is more than the round-off of the members' own."""
     least = 1.0
-    for j in range(w.num[0]):
+    for j in range(w.K[NUM, 0]):
         least = min(least, w.R[j, j])
     return min(1e-7, max(DEPENDENT, 1e-15 / least))
 
@@ -89,47 +94,53 @@ def independence(w: WorkingSet) -> float:
 def largest_coefficient(w: WorkingSet) -> float:
     """The size that coefficients of inequalities in ``r`` are compared with."""
     largest = _LEAST
-    for j in range(w.num[0]):
-        if w.kind[j] != FIXED:
-            largest = max(largest, abs(w.r[j]))
+    for j in range(w.K[NUM, 0]):
+        if w.K[KIND, j] != FIXED:
+            largest = max(largest, abs(w.V[SUM, j]))
     return largest
 
 
 @part
-def _take_in(w: WorkingSet, q: Inequalities, code: int, u: FloatArray, s: float, most: int) -> int:
+def _first_in_the_way(w: WorkingSet, floor: float) -> tuple[int, float]:
+    """The free member whose multiplier vanishes first as the newcomer's grows (-1: none), and by how much it grows."""
+    blocking, first = -1, np.inf
+    for j in range(w.K[NUM, 0]):
+        if w.K[KIND, j] == FREE and w.V[SUM, j] > floor:
+            step = max(w.V[LAM, j], 0.0) / w.V[SUM, j]
+            if step < first:
+                blocking, first = j, step
+    return blocking, first
+
+
+@part
+def _bring_in(w: WorkingSet, q: Inequalities, code: int, u: FloatArray, s: float, most: int) -> int:
     """Make the violated inequality a member, dropping those in its way."""
     side = right_side(q, code)
     n = w.Q.shape[1]
-    combine(w, w.g, w.lam)
+    combine(w, w.V[G], w.V[LAM])
     for _ in range(most):
         left = normal_of(q, code, w)
-        combine(w, w.h, w.r)
+        combine(w, w.V[H], w.V[SUM])
         floor = SMALL * largest_coefficient(w)
-        blocking, first = -1, np.inf
-        for j in range(w.num[0]):
-            if w.kind[j] == FREE and w.r[j] > floor:
-                step = max(w.lam[j], 0.0) / w.r[j]
-                if step < first:
-                    blocking, first = j, step
-        dependent = w.num[0] >= n or left < independence(w)
+        blocking, first = _first_in_the_way(w, floor)
+        dependent = w.K[NUM, 0] >= n or left < independence(w)
         if dependent:
             if blocking < 0:
                 return code
         else:
             missing = side
-            for i in range(w.num[0]):  # n_e . u, the gap along what is left of the normal
-                missing -= w.h[i] * w.g[i]
+            for i in range(w.K[NUM, 0]):  # n_e . u, the gap along what is left of the normal
+                missing -= w.V[H, i] * w.V[G, i]
             x = 0.0
             for k in range(n):
-                x += w.z[k] * u[k]
+                x += w.V[Z, k] * u[k]
             full = (missing - x) / (left * left)
             if full <= first:
-                append(w, code, FREE, left, side, 0.0, s)
-                q.state[code >> 1] = MEMBER
+                take_in(q, w, code, left, s)
                 return SETTLED
             for k in range(n):
-                u[k] += first * w.z[k]
-        for j in range(w.num[0]):
-            w.lam[j] -= first * w.r[j]
+                u[k] += first * w.V[Z, k]
+        for j in range(w.K[NUM, 0]):
+            w.V[LAM, j] -= first * w.V[SUM, j]
         drop(q, w, blocking)
     return STALLED

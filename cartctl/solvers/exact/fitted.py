@@ -1,10 +1,10 @@
 """One fitted level: least ``sum_i dist(a_i . u, [low_i, high_i])^2`` under all that is in force, by a primal method.
 
 Among the inequalities that hold with equality (the members), the step p is the least-squares one for the rows that
-miss their interval: ``p = (A_V N)# (target - A_V u)`` in the members' null space, as far as the first inequality in its
-way and to the lowest point of the sum, which is quadratic by pieces. At rest, ``A_V^T (A_V u - target) = sum_j lam_j n_j``;
-a member with lam_j < 0 is let go. Rows that miss in the end are equations from then on (how much they miss is the same
-in every optimum), as are members with lam_j > 0; rows that are met go on as inequalities.
+miss their interval, ``p = (A_V N)# (target - A_V u)`` in the members' null space: as far as the first inequality in its
+way, and to the lowest point of the sum, which is quadratic by pieces. At rest ``A_V^T (A_V u - target)`` is
+``sum_j lam_j n_j``, and a member with lam_j < 0 is let go. Rows that miss in the end are equations from then on (how
+much they miss is the same in every optimum), as are members with lam_j > 0; rows that are met go on as inequalities.
 """
 
 from __future__ import annotations
@@ -15,13 +15,12 @@ import numpy as np
 
 from cartctl.checks import FloatArray
 from cartctl.kernels import part
-from cartctl.solvers.exact.descent import STALLED
-from cartctl.solvers.exact.inequalities import MEMBER, Inequalities, drop, normal_of, right_side
+from cartctl.solvers.exact.descent import STALLED, most_negative
+from cartctl.solvers.exact.inequalities import Inequalities, drop, normal_of, take_in
 from cartctl.solvers.exact.line_search import blocked_at, lowest_at
 from cartctl.solvers.exact.proof import write_multipliers
-from cartctl.solvers.exact.rows import Equations
 from cartctl.solvers.exact.scaled import MET
-from cartctl.solvers.exact.working_set import FREE, WorkingSet, append, combine, orthogonalise
+from cartctl.solvers.exact.working_set import LAM, NUM, H, WorkingSet, Z, combine, orthogonalise
 
 _NOISE = 1e-9  # of the rows' size: singular values below this lead nowhere
 _REST = 1e-11  # of the largest miss: a step that changes the rows by less is none
@@ -61,8 +60,7 @@ def fitted_level(
                 u[k] += far * p[k]
             if far >= most_far and code >= 0:
                 left = normal_of(q, code, w)
-                append(w, code, FREE, left, right_side(q, code), 0.0, 0.0)
-                q.state[code >> 1] = MEMBER
+                take_in(q, w, code, left, 0.0)
             continue
         _slope(rows, miss, gradient)
         weakest = _multipliers(w, gradient, _PULLS * size * largest)
@@ -109,11 +107,11 @@ def _step(w: WorkingSet, rows: FloatArray, miss: FloatArray, count: int, size: f
             continue
         t = 0.0
         for k in range(n):
-            w.z[k] = rows[i, k]
+            w.V[Z, k] = rows[i, k]
             t += rows[i, k] * rows[i, k]
         orthogonalise(w, math.sqrt(t))
         for k in range(n):
-            B[i, k] = w.z[k]
+            B[i, k] = w.V[Z, k]
     U, s, Vt = np.linalg.svd(B, full_matrices=False)
     rank = 0
     for j in range(s.shape[0]):
@@ -127,10 +125,10 @@ def _step(w: WorkingSet, rows: FloatArray, miss: FloatArray, count: int, size: f
         for k in range(n):
             p[k] += t * Vt[j, k]
     for k in range(n):
-        w.z[k] = p[k]
+        w.V[Z, k] = p[k]
     orthogonalise(w, 0.0)
     for k in range(n):
-        p[k] = w.z[k]
+        p[k] = w.V[Z, k]
     return rank
 
 
@@ -185,13 +183,10 @@ def _slope(rows: FloatArray, miss: FloatArray, gradient: FloatArray) -> None:
 def _multipliers(w: WorkingSet, gradient: FloatArray, nothing: float) -> int:
     """The gradient as a combination of the members, into lam; the free one that pulls away most, or -1."""
     for k in range(gradient.shape[0]):
-        w.z[k] = gradient[k]
+        w.V[Z, k] = gradient[k]
     orthogonalise(w, np.inf)
-    combine(w, w.h, w.lam)
-    worst, found = 0.0, -1
-    for j in range(w.num[0]):
-        if abs(w.lam[j]) <= nothing:
-            w.lam[j] = 0.0
-        elif w.kind[j] == FREE and w.lam[j] < worst:
-            worst, found = w.lam[j], j
-    return found
+    combine(w, w.V[H], w.V[LAM])
+    for j in range(w.K[NUM, 0]):
+        if abs(w.V[LAM, j]) <= nothing:
+            w.V[LAM, j] = 0.0
+    return most_negative(w)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from cartctl.checks import FloatArray
 from cartctl.kernels import part
-from cartctl.solvers.exact.working_set import FIXED, WorkingSet, orthogonalise, remove
+from cartctl.solvers.exact.working_set import FIXED, FREE, KIND, NUM, WHO, WorkingSet, Z, append, orthogonalise, remove
 
 OUT, MEMBER, IMPLIED, EQUAL, SILENT = 0, 1, 2, 3, 4  # not in the set; in it; met with it; an equality; not yet in force
 
@@ -22,96 +22,94 @@ _MET = 1e-12  # relative: an inequality missed by less is met
 
 
 class Inequalities(NamedTuple):
-    """Bounds relative to the reference, the rows and their norms, and where each inequality stands."""
+    """``B[0] <= [u; C u] <= B[1]``, relative to the reference; row norms; where each inequality stands."""
 
-    lower: FloatArray  # (n,)
-    upper: FloatArray  # (n,)
+    B: FloatArray  # (2, n + r)
     C: FloatArray  # (r, n)
-    c_lower: FloatArray  # (r,)
-    c_upper: FloatArray  # (r,)
-    norm: FloatArray  # (r,)
-    unit: FloatArray  # (1,) the size of u that round-off is relative to
+    norm: FloatArray  # (n + r + 1,) 1 for a joint; last, the size of u that round-off is relative to
     state: NDArray[np.int64]  # (n + r,)
 
 
 @part
 def right_side(q: Inequalities, code: int) -> float:
     """C of the inequality ``n . u >= c``."""
-    i, n = code >> 1, q.lower.shape[0]
-    if i < n:
-        return q.lower[i] if code & 1 == 0 else -q.upper[i]
-    r = i - n
-    return q.c_lower[r] / q.norm[r] if code & 1 == 0 else -q.c_upper[r] / q.norm[r]
+    i = code >> 1
+    return q.B[0, i] / q.norm[i] if code & 1 == 0 else -q.B[1, i] / q.norm[i]
 
 
 @part
 def normal_of(q: Inequalities, code: int, w: WorkingSet) -> float:
     """Make z the part of an inequality's unit normal orthogonal to the members, h its components; the norm of z."""
-    i, n = code >> 1, q.lower.shape[0]
+    z, i, n = w.V[Z], code >> 1, w.Q.shape[1]
     sign = 1.0 if code & 1 == 0 else -1.0
     if i < n:
         for k in range(n):
-            w.z[k] = 0.0
-        w.z[i] = sign
+            z[k] = 0.0
+        z[i] = sign
     else:
-        r = i - n
-        sign /= q.norm[r]
+        C = q.C
+        sign /= q.norm[i]
         for k in range(n):
-            w.z[k] = sign * q.C[r, k]
+            z[k] = sign * C[i - n, k]
     return orthogonalise(w, 1.0)
 
 
 @part
 def most_violated(q: Inequalities, u: FloatArray) -> int:
     """The code of the inequality that u misses by most, -1 where all are met."""
-    n = q.lower.shape[0]
-    size = q.unit[0]
+    B, norm, state, n = q.B, q.norm, q.state, u.shape[0]
+    size = norm[state.shape[0]]
     for i in range(n):
         size = max(size, abs(u[i]))
     worst, code = 0.0, -1
-    for i in range(n):
-        if q.state[i] != OUT:
+    for i in range(state.shape[0]):
+        if state[i] != OUT:
             continue
-        below, above = q.lower[i] - u[i], u[i] - q.upper[i]
-        if below > worst and below > _MET * max(size, abs(q.lower[i])):
+        if i < n:
+            x, length = u[i], 1.0
+        else:
+            x, length = 0.0, norm[i]
+            for k in range(n):
+                x += q.C[i - n, k] * u[k]
+        below, above = (B[0, i] - x) / length, (x - B[1, i]) / length
+        if below > worst and below > _MET * max(size, abs(B[0, i]) / length):
             worst, code = below, 2 * i
-        if above > worst and above > _MET * max(size, abs(q.upper[i])):
+        if above > worst and above > _MET * max(size, abs(B[1, i]) / length):
             worst, code = above, 2 * i + 1
-    for r in range(q.norm.shape[0]):
-        if q.state[n + r] != OUT:
-            continue
-        x = 0.0
-        for k in range(n):
-            x += q.C[r, k] * u[k]
-        length = q.norm[r]
-        below, above = (q.c_lower[r] - x) / length, (x - q.c_upper[r]) / length
-        if below > worst and below > _MET * max(size, abs(q.c_lower[r]) / length):
-            worst, code = below, 2 * (n + r)
-        if above > worst and above > _MET * max(size, abs(q.c_upper[r]) / length):
-            worst, code = above, 2 * (n + r) + 1
     return code
+
+
+@part
+def take_in(q: Inequalities, w: WorkingSet, code: int, left: float, s: float) -> None:
+    """Make an inequality, whose normal was just taken apart, a member that may leave."""
+    append(w, code, left, right_side(q, code), 0.0, s)
+    w.K[KIND, w.K[NUM, 0] - 1] = FREE
+    q.state[code >> 1] = MEMBER
 
 
 @part
 def drop(q: Inequalities, w: WorkingSet, j: int) -> None:
     """Take member j, an inequality, out of the set."""
-    q.state[w.who[j] >> 1] = OUT
+    q.state[w.K[WHO, j] >> 1] = OUT
     remove(w, j)
 
 
 @part
 def drop_all_free(q: Inequalities, w: WorkingSet) -> None:
     """Take out every member that is not an equality."""
-    for j in range(w.num[0] - 1, -1, -1):
-        if w.kind[j] != FIXED:
+    for j in range(w.K[NUM, 0] - 1, -1, -1):
+        if w.K[KIND, j] != FIXED:
             drop(q, w, j)
 
 
 @part
 def row_norms(C: FloatArray, norm: FloatArray) -> None:
-    """The Euclidean norm of each row; 1 for a row of zeros."""
+    """The norm of each row, behind those of the joints; 1 for a row of zeros."""
+    n = C.shape[1]
+    for i in range(n):
+        norm[i] = 1.0
     for r in range(C.shape[0]):
         t = 0.0
-        for k in range(C.shape[1]):
+        for k in range(n):
             t += C[r, k] * C[r, k]
-        norm[r] = math.sqrt(t) if t > 0.0 else 1.0
+        norm[n + r] = math.sqrt(t) if t > 0.0 else 1.0

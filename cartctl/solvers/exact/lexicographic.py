@@ -1,7 +1,7 @@
 """The levels in order of priority, and then the point of least norm: one compiled call.
 
-Problem: rows ``A u + d = s b`` (scaled), ``A u + d = b`` (fitted) or ``c_lower <= C u <= c_upper`` at a level of their own
-(kept, or missed by as little as possible), a box, hard rows C, and the reference u0 from which the norm is measured.
+Problem: rows ``A u + d = s b`` (scaled), ``A u + d = b`` (fitted) or ``c_lower <= C u <= c_upper`` at a level of their
+own (missed by as little as possible), a box, hard rows C, and the reference u0 from which the norm is measured.
 """
 
 from __future__ import annotations
@@ -15,10 +15,22 @@ from cartctl.checks import FloatArray
 from cartctl.kernels import kernel, part
 from cartctl.solvers.exact.by_levels import by_levels
 from cartctl.solvers.exact.inequalities import Inequalities, most_violated, row_norms
-from cartctl.solvers.exact.kinds import FITTED, GENERAL, INTERVAL, SCALED
+from cartctl.solvers.exact.kinds import GENERAL, INTERVAL, SCALED
 from cartctl.solvers.exact.proof import write_multipliers
 from cartctl.solvers.exact.rows import Equations, task_size
-from cartctl.solvers.exact.working_set import FIXED, WorkingSet, append, combine, new_working_set, orthogonalise, place
+from cartctl.solvers.exact.working_set import (
+    LAM,
+    NUM,
+    WHO,
+    G,
+    WorkingSet,
+    Z,
+    append,
+    combine,
+    new_working_set,
+    orthogonalise,
+    place,
+)
 
 _DEPENDENT = 2e-8  # of a task's own size: rows this close to each other are left to the levels
 _COARSE = 1e-2  # of the size that commands alone suggest for u: what round-off in them is relative to
@@ -43,24 +55,25 @@ def lexicographic(
     c_upper: FloatArray,
     reference: FloatArray,
     start: NDArray[np.int64],
-    u: FloatArray,
+    out: FloatArray,
     scales: FloatArray,
     active: NDArray[np.int64],
-    proofs: FloatArray,
+    out_proofs: FloatArray,
 ) -> int:
-    """Fill u (n,), scales (p,), active (count, then codes) and, if given room, proofs (p + 1, M + n + r); flags.
+    """Fill out (n,), scales (p,), active (count, then codes) and, if it has columns, out_proofs (p + 1, M + n + r).
 
     sizes, fits, scale: rows, kind and natural norm (0: that of A) of each level. d, reference, lower and upper may be
     empty. Rows of interval levels are the last ones of C, in order. start: codes of inequalities to begin with.
     """
-    n, M, p = u.shape[0], A_.shape[0], sizes.shape[0]
-    w = new_working_set(n)
+    n, M, p = out.shape[0], A_.shape[0], sizes.shape[0]
+    w, u = new_working_set(n), np.empty(n)
+    proofs = np.zeros((p + 1, out_proofs.shape[1]))
     e, q = _arrays(A_, b, d, fits, sizes, lower, upper, C_, c_lower, c_upper, reference, n)
     soft = 0
     for k in range(p):
         if fits[k] == INTERVAL:
             soft += sizes[k]
-    most = 50 + 10 * (n + M + q.norm.shape[0])
+    most = 50 + 10 * (M + q.state.shape[0])
     flags = 0
     members = 0
     done = False
@@ -71,19 +84,22 @@ def lexicographic(
     if not done:
         flags = GENERAL | by_levels(w, q, e, sizes, fits, scale, members, start, u, scales, proofs, most)
     active[0] = 0
-    for j in range(w.num[0]):
-        if w.who[j] >= 0:
+    for j in range(w.K[NUM, 0]):
+        if w.K[WHO, j] >= 0:
             active[0] += 1
-            active[active[0]] = w.who[j]
+            active[active[0]] = w.K[WHO, j]
     for i in range(n):
-        x = min(max(u[i], q.lower[i]), q.upper[i])
+        x = min(max(u[i], q.B[0, i]), q.B[1, i])
         if reference.shape[0] > 0:
             x += reference[i]
             if lower.shape[0] > 0:
                 x = max(x, lower[i])
             if upper.shape[0] > 0:
                 x = min(x, upper[i])
-        u[i] = x
+        out[i] = x
+    for k in range(out_proofs.shape[0]):
+        for i in range(out_proofs.shape[1]):
+            out_proofs[k, i] = proofs[k, i]
     return flags
 
 
@@ -105,14 +121,11 @@ def _arrays(
     """Contiguous copies, relative to the reference, with their norms."""
     M, r = A_.shape[0], C_.shape[0]
     block = np.empty((M + r, n))
-    lines = np.zeros((3, M + n + r))
-    more = np.zeros((3, n + r))
+    lines, B, c_norm = np.zeros((3, M)), np.empty((2, n + r)), np.zeros(n + r + 1)
     A, C = block[:M], block[M:]
-    norm, base, slope = lines[0, :M], lines[1, :M], lines[2, :M]
-    low, high, c_norm = more[0, :n], more[1, :n], lines[0, M : M + r]
-    c_low, c_high = more[0, n:], more[1, n:]
+    norm, base, slope = lines[0], lines[1], lines[2]
     shifted = reference.shape[0] > 0
-    unit = more[2, :1]
+    unit = 0.0
     row = 0
     for k in range(sizes.shape[0]):
         if fits[k] == INTERVAL:
@@ -134,21 +147,19 @@ def _arrays(
                 base[i] -= x * reference[k]
         norm[i] = math.sqrt(t)
     for k in range(n):
-        low[k] = lower[k] if lower.shape[0] > 0 else -np.inf
-        high[k] = upper[k] if upper.shape[0] > 0 else np.inf
+        B[0, k] = lower[k] if lower.shape[0] > 0 else -np.inf
+        B[1, k] = upper[k] if upper.shape[0] > 0 else np.inf
         if shifted:
-            low[k] -= reference[k]
-            high[k] -= reference[k]
-            unit[0] = max(unit[0], abs(reference[k]))
+            B[0, k] -= reference[k]
+            B[1, k] -= reference[k]
+            unit = max(unit, abs(reference[k]))
     for i in range(r):
-        c_low[i], c_high[i] = c_lower[i], c_upper[i]
         t = 0.0
         for k in range(n):
             C[i, k] = C_[i, k]
             if shifted:
                 t += C[i, k] * reference[k]
-        c_low[i] -= t
-        c_high[i] -= t
+        B[0, n + i], B[1, n + i] = c_lower[i] - t, c_upper[i] - t
     row_norms(C, c_norm)
     row = 0
     for k in range(sizes.shape[0]):
@@ -160,10 +171,9 @@ def _arrays(
             largest = max(largest, abs(base[i]) + abs(slope[i]))
         row += sizes[k]
         if size > 0.0:
-            unit[0] = max(unit[0], _COARSE * largest / size)
-    return Equations(A, norm, base, slope), Inequalities(
-        low, high, C, c_low, c_high, c_norm, unit, np.zeros(n + r, np.int64)
-    )
+            unit = max(unit, _COARSE * largest / size)
+    c_norm[n + r] = unit
+    return Equations(A, norm, base, slope), Inequalities(B, C, c_norm, np.zeros(n + r, np.int64))
 
 
 @part
@@ -178,26 +188,26 @@ def _all_at_once(
 ) -> tuple[bool, int]:
     """The least norm on all equations at s = 1, if they are independent and it is inside: done, rows in the set."""
     for i in range(u.shape[0]):
-        if q.lower[i] == q.upper[i]:
+        if q.B[0, i] == q.B[1, i]:
             return False, 0
-    row = 0
+    begin = np.zeros(sizes.shape[0] + 1, np.int64)
     for k in range(sizes.shape[0]):
-        size = task_size(e, row, row + sizes[k], natural[k])
-        for i in range(row, row + sizes[k]):
+        begin[k + 1] = begin[k] + sizes[k]
+        size = task_size(e, begin[k], begin[k + 1], natural[k])
+        for i in range(begin[k], begin[k + 1]):
             norm = e.norm[i]
             if norm <= _DEPENDENT * size:
                 return False, i
-            for j in range(w.z.shape[0]):
-                w.z[j] = e.A[i, j] / norm
+            for j in range(w.Q.shape[1]):
+                w.V[Z, j] = e.A[i, j] / norm
             left = orthogonalise(w, 1.0)
             if left * norm <= _DEPENDENT * size:
                 return False, i
-            append(w, -1 - i, FIXED, left, e.base[i] / norm, e.slope[i] / norm, 1.0)
-        row += sizes[k]
+            append(w, -1 - i, left, e.base[i] / norm, e.slope[i] / norm, 1.0)
     place(w, u)
     if most_violated(q, u) >= 0:
-        return False, row
-    if proofs.shape[0] > 0:
-        combine(w, w.g, w.lam)
+        return False, w.K[NUM, 0]
+    if proofs.shape[1] > 0:
+        combine(w, w.V[G], w.V[LAM])
         write_multipliers(w, q, e.norm, proofs[sizes.shape[0]])
-    return True, row
+    return True, w.K[NUM, 0]

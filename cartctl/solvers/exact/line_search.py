@@ -15,24 +15,22 @@ _ALONG = 1e-12  # of the step: a component this small does not approach an inequ
 @part
 def blocked_at(q: Inequalities, w: WorkingSet, u: FloatArray, p: FloatArray) -> tuple[float, int]:
     """The largest share of step p that keeps every inequality, and the code of the one that ends it (-1: none)."""
-    n = q.lower.shape[0]
+    n = u.shape[0]
     size = 0.0
     for k in range(n):
         size = max(size, abs(p[k]))
     far, code = np.inf, -1
-    for i in range(n + q.norm.shape[0]):
+    for i in range(q.state.shape[0]):
         if q.state[i] != OUT:
             continue
         if i < n:
-            x, dx, low, high, length = u[i], p[i], q.lower[i], q.upper[i], 1.0
+            x, dx = u[i], p[i]
         else:
-            r = i - n
-            length = q.norm[r]
-            low, high = q.c_lower[r], q.c_upper[r]
             x, dx = 0.0, 0.0
             for k in range(n):
-                x += q.C[r, k] * u[k]
-                dx += q.C[r, k] * p[k]
+                x += q.C[i - n, k] * u[k]
+                dx += q.C[i - n, k] * p[k]
+        low, high, length = q.B[0, i], q.B[1, i], q.norm[i]
         if dx < -_ALONG * size * length and (low - x) / dx < far:
             far, code = max((low - x) / dx, 0.0), 2 * i
         elif dx > _ALONG * size * length and (high - x) / dx < far:
@@ -41,9 +39,7 @@ def blocked_at(q: Inequalities, w: WorkingSet, u: FloatArray, p: FloatArray) -> 
 
 
 @part
-def lowest_at(
-    rows: FloatArray, low: FloatArray, high: FloatArray, u: FloatArray, p: FloatArray, most: float
-) -> float:
+def lowest_at(rows: FloatArray, low: FloatArray, high: FloatArray, u: FloatArray, p: FloatArray, most: float) -> float:
     """Where the sum of squared misses is least along u + far p, far in [0, most]."""
     m, n = rows.shape
     start, rate = np.zeros(m), np.zeros(m)

@@ -10,7 +10,7 @@ from __future__ import annotations
 from cartctl.checks import FloatArray
 from cartctl.kernels import part
 from cartctl.solvers.exact.inequalities import Inequalities
-from cartctl.solvers.exact.working_set import WorkingSet
+from cartctl.solvers.exact.working_set import LAM, NUM, WHO, WorkingSet, Y
 
 NOBODY = -(1 << 40)  # the code of no member
 
@@ -20,8 +20,8 @@ def write_proof(w: WorkingSet, q: Inequalities, norm: FloatArray, implied: int, 
     """Add the members with their shares y, and the implied one with share 1, to a proof vector (may be empty)."""
     if proof.shape[0] == 0:
         return
-    for j in range(w.num[0]):
-        credit(q, norm, w.who[j], w.y[j], proof)
+    for j in range(w.K[NUM, 0]):
+        credit(q, norm, w.K[WHO, j], w.V[Y, j], proof)
     if implied != NOBODY:
         credit(q, norm, implied, 1.0, proof)
 
@@ -31,8 +31,8 @@ def write_multipliers(w: WorkingSet, q: Inequalities, norm: FloatArray, proof: F
     """Add the members with their multipliers to a proof vector (may be empty)."""
     if proof.shape[0] == 0:
         return
-    for j in range(w.num[0]):
-        credit(q, norm, w.who[j], w.lam[j], proof)
+    for j in range(w.K[NUM, 0]):
+        credit(q, norm, w.K[WHO, j], w.V[LAM, j], proof)
 
 
 @part
@@ -42,6 +42,5 @@ def credit(q: Inequalities, norm: FloatArray, who: int, share: float, proof: Flo
         row = -1 - who
         proof[row] += share / norm[row] if norm[row] > 0.0 else share
         return
-    i, n, M = who >> 1, q.lower.shape[0], norm.shape[0]
-    sign = share if who & 1 == 0 else -share
-    proof[M + i] += sign if i < n else sign / q.norm[i - n]
+    i = who >> 1
+    proof[norm.shape[0] + i] += (share if who & 1 == 0 else -share) / q.norm[i]

@@ -7,9 +7,24 @@ from typing import NamedTuple
 
 from cartctl.checks import FloatArray
 from cartctl.kernels import part
-from cartctl.solvers.exact.proof import NOBODY, credit
 from cartctl.solvers.exact.inequalities import Inequalities
-from cartctl.solvers.exact.working_set import FIXED, WorkingSet, append, combine, orthogonalise, refill
+from cartctl.solvers.exact.proof import NOBODY, credit
+from cartctl.solvers.exact.working_set import (
+    C0,
+    C1,
+    NUM,
+    SUM,
+    WHO,
+    G,
+    H,
+    WorkingSet,
+    Y,
+    Z,
+    append,
+    combine,
+    orthogonalise,
+    refill,
+)
 
 END = 1e-9  # s this far outside [0, 1] is round-off
 _DEPENDENT = 2e-8  # of the task's own size: what is left of a row is noise
@@ -39,15 +54,15 @@ def fix_rows(w: WorkingSet, e: Equations, first: int, last: int, size: float, u:
     """Make equalities of what rows first..last are at u; those that depend on the members say nothing new."""
     for i in range(first, last):
         norm = e.norm[i]
-        if norm <= _DEPENDENT * size or w.num[0] >= u.shape[0]:
+        if norm <= _DEPENDENT * size or w.K[NUM, 0] >= u.shape[0]:
             continue
         x = 0.0
         for k in range(u.shape[0]):
-            w.z[k] = e.A[i, k] / norm
-            x += w.z[k] * u[k]
+            w.V[Z, k] = e.A[i, k] / norm
+            x += w.V[Z, k] * u[k]
         left = orthogonalise(w, 1.0)
         if left * norm > _DEPENDENT * size:
-            append(w, -1 - i, FIXED, left, x, 0.0, 0.0)
+            append(w, -1 - i, left, x, 0.0, 0.0)
 
 
 @part
@@ -67,25 +82,25 @@ def add_rows(
         norm = e.norm[i]
         left = 0.0
         if norm > _DEPENDENT * size:
-            for k in range(w.z.shape[0]):
-                w.z[k] = e.A[i, k] / norm
+            for k in range(w.Q.shape[1]):
+                w.V[Z, k] = e.A[i, k] / norm
             left = orthogonalise(w, 1.0)
-            if left * norm > _DEPENDENT * size and w.num[0] < w.z.shape[0]:
-                append(w, -1 - i, FIXED, left, e.base[i] / norm, e.slope[i] / norm, s)
+            if left * norm > _DEPENDENT * size and w.K[NUM, 0] < w.Q.shape[1]:
+                append(w, -1 - i, left, e.base[i] / norm, e.slope[i] / norm, s)
                 continue
-            combine(w, w.h, w.r)
+            combine(w, w.V[H], w.V[SUM])
         else:
             norm = max(size, norm) if size > 0.0 else 1.0
-            for j in range(w.num[0]):
-                w.r[j] = 0.0
+            for j in range(w.K[NUM, 0]):
+                w.V[SUM, j] = 0.0
         lost = True
         at, bt = -e.base[i] / norm, e.slope[i] / norm
         at_size, bt_size = abs(at), max(abs(bt), largest / norm)
-        for j in range(w.num[0]):
-            at += w.r[j] * w.c0[j]
-            bt -= w.r[j] * w.c1[j]
-            at_size = max(at_size, abs(w.r[j] * w.c0[j]), abs(w.g[j]))
-            bt_size = max(bt_size, abs(w.r[j] * w.c1[j]))
+        for j in range(w.K[NUM, 0]):
+            at += w.V[SUM, j] * w.V[C0, j]
+            bt -= w.V[SUM, j] * w.V[C1, j]
+            at_size = max(at_size, abs(w.V[SUM, j] * w.V[C0, j]), abs(w.V[G, j]))
+            bt_size = max(bt_size, abs(w.V[SUM, j] * w.V[C1, j]))
         if abs(bt) <= _SAME * bt_size:
             if abs(at) <= _SAME * max(at_size, bt_size):
                 continue
@@ -97,8 +112,8 @@ def add_rows(
             return False, math.nan, pin, lost
         if pin == NOBODY:
             pin, s = -1 - i, min(1.0, max(0.0, pinned))
-            for j in range(w.num[0]):
-                w.y[j] = -w.r[j]
+            for j in range(w.K[NUM, 0]):
+                w.V[Y, j] = -w.V[SUM, j]
             refill(w, s)
     return True, s, pin, lost
 
@@ -108,6 +123,6 @@ def _prove_row(w: WorkingSet, q: Inequalities, e: Equations, i: int, proof: Floa
     """The combination of members and row i that cancels."""
     if proof.shape[0] == 0:
         return
-    for j in range(w.num[0]):
-        credit(q, e.norm, w.who[j], -w.r[j], proof)
+    for j in range(w.K[NUM, 0]):
+        credit(q, e.norm, w.K[WHO, j], -w.V[SUM, j], proof)
     credit(q, e.norm, -1 - i, 1.0, proof)

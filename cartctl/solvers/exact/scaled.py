@@ -17,10 +17,28 @@ from numpy.typing import NDArray
 from cartctl.checks import FloatArray
 from cartctl.kernels import part
 from cartctl.solvers.exact.descent import DEPENDENT, SMALL, STALLED, largest_coefficient, load, settle
-from cartctl.solvers.exact.inequalities import EQUAL, IMPLIED, MEMBER, OUT, Inequalities, drop, normal_of, right_side
+from cartctl.solvers.exact.inequalities import EQUAL, IMPLIED, OUT, Inequalities, drop, normal_of, right_side, take_in
 from cartctl.solvers.exact.proof import NOBODY, write_proof
 from cartctl.solvers.exact.rows import END, Equations, add_rows
-from cartctl.solvers.exact.working_set import FIXED, FREE, TIED, WorkingSet, append, combine, place, refill, remove
+from cartctl.solvers.exact.working_set import (
+    C0,
+    C1,
+    FIXED,
+    FREE,
+    KIND,
+    NUM,
+    SUM,
+    TIED,
+    WHO,
+    H,
+    WorkingSet,
+    Y,
+    append,
+    combine,
+    place,
+    refill,
+    remove,
+)
 
 MET, SKIPPED = 0, 1  # how a level went; or STALLED
 
@@ -77,15 +95,10 @@ def _cut(
     w: WorkingSet, q: Inequalities, e: Equations, code: int, implied: int, s: float, proof: FloatArray
 ) -> tuple[bool, float, int]:
     """Lower s to where the inequality that contradicts the members can be met: possible, s, the implied code."""
-    leaving, share = -1, 0.0
-    if implied != NOBODY:
-        floor = SMALL * largest_coefficient(w)
-        for j in range(w.num[0]):
-            if w.kind[j] == TIED and w.r[j] > floor and w.r[j] > share * w.y[j]:
-                leaving, share = j, w.r[j] / w.y[j]
+    leaving, share = _tightest(w) if implied != NOBODY else (-1, 0.0)
     slope, size = 0.0, 0.0
-    for j in range(w.num[0]):
-        term = (share * w.y[j] - w.r[j]) * w.c1[j]
+    for j in range(w.K[NUM, 0]):
+        term = (share * w.V[Y, j] - w.V[SUM, j]) * w.V[C1, j]
         slope += term
         size += abs(term)
     if slope <= 1e-13 * size:
@@ -94,22 +107,22 @@ def _cut(
     if leaving >= 0:  # the old proof is mixed in until its tightest member cancels; its implied one takes that place
         drop(q, w, leaving)
         left = normal_of(q, implied, w)
-        append(w, implied, TIED, left, right_side(q, implied), 0.0, s)
-        q.state[implied >> 1] = MEMBER
+        take_in(q, w, implied, left, s)
+        w.K[KIND, w.K[NUM, 0] - 1] = TIED
         normal_of(q, code, w)
-        combine(w, w.h, w.r)  # afresh: updated from cut to cut, it would gather round-off
+        combine(w, w.V[H], w.V[SUM])  # afresh: updated from cut to cut, it would gather round-off
     elif implied != NOBODY:
         q.state[implied >> 1] = OUT
     floor = SMALL * largest_coefficient(w)
     constant, slope = right_side(q, code), 0.0
-    for j in range(w.num[0]):
-        constant -= w.r[j] * w.c0[j]
-        slope -= w.r[j] * w.c1[j]
-        w.y[j] = -w.r[j]
-        if w.kind[j] != FIXED:
-            w.kind[j] = TIED if w.y[j] > floor else FREE
-            if w.kind[j] == FREE:
-                w.y[j] = 0.0
+    for j in range(w.K[NUM, 0]):
+        constant -= w.V[SUM, j] * w.V[C0, j]
+        slope -= w.V[SUM, j] * w.V[C1, j]
+        w.V[Y, j] = -w.V[SUM, j]
+        if w.K[KIND, j] != FIXED:
+            w.K[KIND, j] = TIED if w.V[Y, j] > floor else FREE
+            if w.K[KIND, j] == FREE:
+                w.V[Y, j] = 0.0
     if not slope > 0.0 or constant > END * slope:
         write_proof(w, q, e.norm, code, proof)
         return False, s, code
@@ -117,6 +130,17 @@ def _cut(
     q.state[code >> 1] = IMPLIED
     refill(w, s)
     return True, s, code
+
+
+@part
+def _tightest(w: WorkingSet) -> tuple[int, float]:
+    """How much of the old proof keeps every share of the new one positive, and the member that then cancels (-1)."""
+    floor = SMALL * largest_coefficient(w)
+    leaving, share = -1, 0.0
+    for j in range(w.K[NUM, 0]):
+        if w.K[KIND, j] == TIED and w.V[SUM, j] > floor and w.V[SUM, j] > share * w.V[Y, j]:
+            leaving, share = j, w.V[SUM, j] / w.V[Y, j]
+    return leaving, share
 
 
 @part
@@ -129,41 +153,47 @@ def _prove_contradiction(
     if implied != NOBODY:
         rising = 0.0 if implied >= 0 else e.slope[-1 - implied] / e.norm[-1 - implied]
         falling = 0.0
-        for j in range(w.num[0]):
-            rising += w.y[j] * w.c1[j]
-            falling += w.r[j] * w.c1[j]
+        for j in range(w.K[NUM, 0]):
+            rising += w.V[Y, j] * w.V[C1, j]
+            falling += w.V[SUM, j] * w.V[C1, j]
         if rising != 0.0:
             share = falling / rising
         write_proof(w, q, e.norm, implied, proof)
         for i in range(proof.shape[0]):
             proof[i] *= share
-    for j in range(w.num[0]):
-        w.y[j] = -w.r[j]
+    for j in range(w.K[NUM, 0]):
+        w.V[Y, j] = -w.V[SUM, j]
     write_proof(w, q, e.norm, code, proof)
 
 
 @part
 def _freeze(w: WorkingSet, q: Inequalities, implied: int, first: int, s: float) -> None:
     """Make equalities of what the scale depends on; the implied one changes places with a worse conditioned member."""
-    found = -1
+    found = _ill_conditioned(w, first) if implied >= 0 else -1
     if implied >= 0:
         q.state[implied >> 1] = EQUAL
-        worst = _WORSE
-        for j in range(w.num[0]):
-            own = w.kind[j] == TIED or w.who[j] < -first
-            if own and abs(w.y[j]) > worst:
-                worst, found = abs(w.y[j]), j
-    for j in range(w.num[0]):
-        if w.kind[j] == TIED:
-            w.kind[j] = FIXED
-            q.state[w.who[j] >> 1] = EQUAL
+    for j in range(w.K[NUM, 0]):
+        if w.K[KIND, j] == TIED:
+            w.K[KIND, j] = FIXED
+            q.state[w.K[WHO, j] >> 1] = EQUAL
     if found >= 0:
         remove(w, found)
         left = normal_of(q, implied, w)
         if left > DEPENDENT:
-            append(w, implied, FIXED, left, right_side(q, implied), 0.0, s)
-    for j in range(w.num[0]):
-        w.c0[j] += s * w.c1[j]
-        w.c1[j] = 0.0
-        w.y[j] = 0.0
+            append(w, implied, left, right_side(q, implied), 0.0, s)
+    for j in range(w.K[NUM, 0]):
+        w.V[C0, j] += s * w.V[C1, j]
+        w.V[C1, j] = 0.0
+        w.V[Y, j] = 0.0
     refill(w, 0.0)
+
+
+@part
+def _ill_conditioned(w: WorkingSet, first: int) -> int:
+    """The member of this level with a share so large that the implied one stands better in its place, or -1."""
+    worst, found = _WORSE, -1
+    for j in range(w.K[NUM, 0]):
+        own = w.K[KIND, j] == TIED or w.K[WHO, j] < -first
+        if own and abs(w.V[Y, j]) > worst:
+            worst, found = abs(w.V[Y, j]), j
+    return found

@@ -21,59 +21,47 @@ FIXED, FREE, TIED = 0, 1, 2  # an equality; an inequality that may leave; one th
 _CANCELLED = 0.3  # of a norm left after one pass: below, a second pass restores orthogonality
 
 
+# Rows of V. Few arrays in one tuple: passing many of them from part to part costs more than the arithmetic.
+G = 0  # the point of least norm along Q
+C0, C1 = 1, 2  # right-hand sides c0 + s c1
+Y = 3  # the members' share in the proof that s cannot be larger
+LAM = 4  # multipliers
+H, SUM, Z = 5, 6, 7  # scratch: a normal's components along Q; as a sum of members; what of it is orthogonal to them
+
+# Rows of K.
+WHO, KIND = 0, 1  # an inequality's code or -1 - row of an equation; FIXED, FREE or TIED
+NUM = 2  # its first entry: how many members there are
+
+
 class WorkingSet(NamedTuple):
-    """Up to n members and scratch space; ``num[0]`` is how many members there are."""
+    """Up to n members and scratch space."""
 
     Q: FloatArray  # (n + 1, n)
     R: FloatArray  # (n + 1, n + 1)
-    g: FloatArray  # (n + 1,)
-    c0: FloatArray  # (n + 1,) right-hand sides c0 + s c1
-    c1: FloatArray  # (n + 1,)
-    y: FloatArray  # (n + 1,) the members' share in the proof that s cannot be larger
-    lam: FloatArray  # (n + 1,) multipliers
-    h: FloatArray  # (n + 1,) scratch: the components of a normal along Q
-    r: FloatArray  # (n + 1,) scratch: a normal as a combination of members
-    z: FloatArray  # (n,) scratch: a normal, then what of it is orthogonal to the members
-    who: NDArray[np.int64]  # (n + 1,) an inequality's code, or -1 - row of an equation
-    kind: NDArray[np.int64]  # (n + 1,)
-    num: NDArray[np.int64]  # (1,)
+    V: FloatArray  # (8, n + 1)
+    K: NDArray[np.int64]  # (3, n + 1)
 
 
 @part
 def new_working_set(n: int) -> WorkingSet:
     """An empty one in R^n."""
-    square = np.empty((2 * n + 2, n + 1))
-    lines = np.zeros((8, n + 1))
-    marks = np.zeros((3, n + 1), np.int64)
     return WorkingSet(
-        np.empty((n + 1, n)),
-        square[: n + 1],
-        lines[0],
-        lines[1],
-        lines[2],
-        lines[3],
-        lines[4],
-        lines[5],
-        lines[6],
-        lines[7, :n],
-        marks[0],
-        marks[1],
-        marks[2],
+        np.empty((n + 1, n)), np.empty((n + 1, n + 1)), np.zeros((8, n + 1)), np.zeros((3, n + 1), np.int64)
     )
 
 
 @part
 def orthogonalise(w: WorkingSet, norm: float) -> float:
     """Take the members' directions out of z (of the given norm), their components into h; the norm that is left."""
-    q, n = w.num[0], w.Q.shape[1]
-    z = w.z
+    Q, h, z, q = w.Q, w.V[H], w.V[Z], w.K[NUM, 0]
+    n = Q.shape[1]
     for i in range(q):
         t = 0.0
         for k in range(n):
-            t += w.Q[i, k] * z[k]
+            t += Q[i, k] * z[k]
         for k in range(n):
-            z[k] -= t * w.Q[i, k]
-        w.h[i] = t
+            z[k] -= t * Q[i, k]
+        h[i] = t
     left = 0.0
     for k in range(n):
         left += z[k] * z[k]
@@ -83,10 +71,10 @@ def orthogonalise(w: WorkingSet, norm: float) -> float:
     for i in range(q):
         t = 0.0
         for k in range(n):
-            t += w.Q[i, k] * z[k]
+            t += Q[i, k] * z[k]
         for k in range(n):
-            z[k] -= t * w.Q[i, k]
-        w.h[i] += t
+            z[k] -= t * Q[i, k]
+        h[i] += t
     left = 0.0
     for k in range(n):
         left += z[k] * z[k]
@@ -94,31 +82,32 @@ def orthogonalise(w: WorkingSet, norm: float) -> float:
 
 
 @part
-def append(w: WorkingSet, who: int, kind: int, left: float, c0: float, c1: float, s: float) -> None:
-    """Add the normal whose orthogonal part is z (of norm left) and whose components are h."""
-    q, n = w.num[0], w.Q.shape[1]
+def append(w: WorkingSet, who: int, left: float, c0: float, c1: float, s: float) -> None:
+    """Add the equality whose normal has the orthogonal part z, of norm left, and the components h."""
+    Q, R, g, h, z, q = w.Q, w.R, w.V[G], w.V[H], w.V[Z], w.K[NUM, 0]
     t = c0 + s * c1
     for i in range(q):
-        w.R[q, i] = w.h[i]
-        t -= w.h[i] * w.g[i]
-    w.R[q, q] = left
-    w.g[q] = t / left
-    for k in range(n):
-        w.Q[q, k] = w.z[k] / left
-    w.who[q], w.kind[q], w.c0[q], w.c1[q], w.y[q], w.lam[q] = who, kind, c0, c1, 0.0, 0.0
-    w.num[0] = q + 1
+        R[q, i] = h[i]
+        t -= h[i] * g[i]
+    R[q, q] = left
+    g[q] = t / left
+    for k in range(Q.shape[1]):
+        Q[q, k] = z[k] / left
+    w.K[WHO, q], w.K[KIND, q], w.V[C0, q], w.V[C1, q], w.V[Y, q], w.V[LAM, q] = who, FIXED, c0, c1, 0.0, 0.0
+    w.K[NUM, 0] = q + 1
 
 
 @part
 def remove(w: WorkingSet, k: int) -> None:
     """Take out member k; the later ones move up."""
-    q, n = w.num[0], w.Q.shape[1]
-    R, Q, g = w.R, w.Q, w.g
+    q, n = w.K[NUM, 0], w.Q.shape[1]
+    R, Q, g = w.R, w.Q, w.V[G]
     for j in range(k + 1, q):
         for i in range(j + 1):
             R[j - 1, i] = R[j, i]
-        w.who[j - 1], w.kind[j - 1], w.c0[j - 1], w.c1[j - 1] = w.who[j], w.kind[j], w.c0[j], w.c1[j]
-        w.y[j - 1], w.lam[j - 1] = w.y[j], w.lam[j]
+        w.K[WHO, j - 1], w.K[KIND, j - 1] = w.K[WHO, j], w.K[KIND, j]
+        for i in (C0, C1, Y, LAM):
+            w.V[i, j - 1] = w.V[i, j]
     for i in range(k, q - 1):  # column i reaches one row too far: turn it into column i + 1
         a, b = R[i, i], R[i, i + 1]
         length = math.sqrt(a * a + b * b)
@@ -132,53 +121,55 @@ def remove(w: WorkingSet, k: int) -> None:
             Q[i, j], Q[i + 1, j] = cos * a + sin * b, cos * b - sin * a
         a, b = g[i], g[i + 1]
         g[i], g[i + 1] = cos * a + sin * b, cos * b - sin * a
-    w.num[0] = q - 1
+    w.K[NUM, 0] = q - 1
 
 
 @part
 def combine(w: WorkingSet, components: FloatArray, out: FloatArray) -> None:
     """``R^T out = components``: a vector with the given components along Q, as a combination of the members."""
-    q = w.num[0]
+    R, q = w.R, w.K[NUM, 0]
     for j in range(q):
         out[j] = components[j]
     for j in range(q - 1, -1, -1):
-        out[j] /= w.R[j, j]
+        t = out[j] / R[j, j]
+        out[j] = t
         for i in range(j):
-            out[i] -= w.R[j, i] * out[j]
+            out[i] -= R[j, i] * t
 
 
 @part
 def refill(w: WorkingSet, s: float) -> None:
     """``R g = c0 + s c1`` anew, at another scale."""
-    for j in range(w.num[0]):
-        t = w.c0[j] + s * w.c1[j]
+    R, g, c0, c1 = w.R, w.V[G], w.V[C0], w.V[C1]
+    for j in range(w.K[NUM, 0]):
+        t = c0[j] + s * c1[j]
         for i in range(j):
-            t -= w.R[j, i] * w.g[i]
-        w.g[j] = t / w.R[j, j]
+            t -= R[j, i] * g[i]
+        g[j] = t / R[j, j]
 
 
 @part
 def place(w: WorkingSet, u: FloatArray) -> None:
     """``u = Q^T g``: the point of least norm on the members."""
-    n = w.Q.shape[1]
+    Q, g, n = w.Q, w.V[G], u.shape[0]
     for k in range(n):
         u[k] = 0.0
-    for i in range(w.num[0]):
-        t = w.g[i]
+    for i in range(w.K[NUM, 0]):
+        t = g[i]
         for k in range(n):
-            u[k] += t * w.Q[i, k]
+            u[k] += t * Q[i, k]
 
 
 @part
 def copy_members(source: WorkingSet, target: WorkingSet) -> None:
     """Make ``target`` equal to ``source``."""
-    q, n = source.num[0], source.Q.shape[1]
+    q, n = source.K[NUM, 0], source.Q.shape[1]
     for j in range(q):
         for k in range(n):
             target.Q[j, k] = source.Q[j, k]
         for i in range(j + 1):
             target.R[j, i] = source.R[j, i]
-        target.g[j], target.c0[j], target.c1[j] = source.g[j], source.c0[j], source.c1[j]
-        target.y[j], target.lam[j] = source.y[j], source.lam[j]
-        target.who[j], target.kind[j] = source.who[j], source.kind[j]
-    target.num[0] = q
+        target.K[WHO, j], target.K[KIND, j] = source.K[WHO, j], source.K[KIND, j]
+        for i in (G, C0, C1, Y, LAM):
+            target.V[i, j] = source.V[i, j]
+    target.K[NUM, 0] = q
