@@ -14,7 +14,8 @@ __version__ = "0.1.0"
 
 _HOMES = {
     "cartctl.errors": ("CartctlError", "CartctlWarning", "RunInterrupted"),
-    "cartctl.algebra.problem": ("Equation", "Problem"),
+    "cartctl.algebra.certificate": ("Certificate", "LevelCertificate"),
+    "cartctl.algebra.problem": ("Equation", "Inequality", "Problem"),
     "cartctl.algebra.solution": ("Solution", "Status"),
     "cartctl.algebra.inverses": (
         "Damped",
@@ -37,6 +38,10 @@ _HOMES = {
     "cartctl.solvers.reverse_priority": ("ReversePriority",),
     "cartctl.solvers.sdls": ("SDLS",),
     "cartctl.solvers.singularity_robust_priority": ("SingularityRobustPriority",),
+    "cartctl.solvers.hqp": ("HQP",),
+    "cartctl.solvers.qp": ("QP",),
+    "cartctl.solvers.sns": ("SNS",),
+    "cartctl.solvers.sns_greedy": ("SNSGreedy",),
     "cartctl.solvers.task_scaling": ("TaskScaling",),
     "cartctl.solvers.transpose": ("Transpose",),
     "cartctl.solvers.dls": ("DLS",),
@@ -57,8 +62,9 @@ _HOMES = {
         "RelativeFrameTask",
         "Task",
     ),
+    "cartctl.constraints": ("Constraint", "FrameBox", "FrameSpeed", "HalfSpace"),
     "cartctl.objectives": ("JointRange", "Objective"),
-    "cartctl.levels": ("Command",),
+    "cartctl.levels": ("AccelerationLevel", "Command"),
     "cartctl.motion.controller": ("Controller",),
     "cartctl.motion.simulate": ("simulate",),
     "cartctl.motion.run": ("Run", "TaskRecord"),
@@ -82,6 +88,8 @@ _HOME_OF = {name: module for module, names in _HOMES.items() for name in names}
 __all__ = ["__version__", *sorted(_HOME_OF)]  # noqa: PLE0604 - names, from the table above
 
 if TYPE_CHECKING:  # editors and mypy see what __getattr__ finds
+    from cartctl.algebra.certificate import Certificate as Certificate
+    from cartctl.algebra.certificate import LevelCertificate as LevelCertificate
     from cartctl.algebra.inverses import Damped as Damped
     from cartctl.algebra.inverses import InversePolicy as InversePolicy
     from cartctl.algebra.inverses import ManipulabilityDamped as ManipulabilityDamped
@@ -90,12 +98,18 @@ if TYPE_CHECKING:  # editors and mypy see what __getattr__ finds
     from cartctl.algebra.inverses import SigmaDamped as SigmaDamped
     from cartctl.algebra.inverses import Truncated as Truncated
     from cartctl.algebra.problem import Equation as Equation
+    from cartctl.algebra.problem import Inequality as Inequality
     from cartctl.algebra.problem import Problem as Problem
     from cartctl.algebra.solution import Solution as Solution
     from cartctl.algebra.solution import Status as Status
+    from cartctl.constraints import Constraint as Constraint
+    from cartctl.constraints import FrameBox as FrameBox
+    from cartctl.constraints import FrameSpeed as FrameSpeed
+    from cartctl.constraints import HalfSpace as HalfSpace
     from cartctl.errors import CartctlError as CartctlError
     from cartctl.errors import CartctlWarning as CartctlWarning
     from cartctl.errors import RunInterrupted as RunInterrupted
+    from cartctl.levels import AccelerationLevel as AccelerationLevel
     from cartctl.levels import Command as Command
     from cartctl.levels.metrics import JointLimitMetric as JointLimitMetric
     from cartctl.model.library import robots as robots
@@ -132,14 +146,18 @@ if TYPE_CHECKING:  # editors and mypy see what __getattr__ finds
     from cartctl.solvers.dls_manipulability import DLSManipulability as DLSManipulability
     from cartctl.solvers.dls_sigma import DLSSigma as DLSSigma
     from cartctl.solvers.extended_jacobian import ExtendedJacobian as ExtendedJacobian
+    from cartctl.solvers.hqp import HQP as HQP
     from cartctl.solvers.main_variables import MainVariables as MainVariables
     from cartctl.solvers.numerical_filtering import NumericalFilteringSolver as NumericalFilteringSolver
     from cartctl.solvers.pinv import Pinv as Pinv
     from cartctl.solvers.projected_gradient import ProjectedGradient as ProjectedGradient
+    from cartctl.solvers.qp import QP as QP
     from cartctl.solvers.reduced_gradient import ReducedGradient as ReducedGradient
     from cartctl.solvers.reverse_priority import ReversePriority as ReversePriority
     from cartctl.solvers.sdls import SDLS as SDLS
     from cartctl.solvers.singularity_robust_priority import SingularityRobustPriority as SingularityRobustPriority
+    from cartctl.solvers.sns import SNS as SNS
+    from cartctl.solvers.sns_greedy import SNSGreedy as SNSGreedy
     from cartctl.solvers.task_priority import TaskPriority as TaskPriority
     from cartctl.solvers.task_scaling import TaskScaling as TaskScaling
     from cartctl.solvers.transpose import Transpose as Transpose

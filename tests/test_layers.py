@@ -19,7 +19,7 @@ FILES = sorted(PACKAGE.rglob("*.py"))
 GROUND = {"errors", "checks", "kernels"}
 ALGEBRA = GROUND | {"algebra"}
 ROBOT = GROUND | {"spatial", "paths", "model"}
-JOINED = ALGEBRA | ROBOT | {"solvers", "tasks", "objectives", "analysis", "levels"}
+JOINED = ALGEBRA | ROBOT | {"solvers", "tasks", "constraints", "objectives", "analysis", "levels"}
 MAY_IMPORT = {
     "errors": set(),
     "checks": {"errors"},
@@ -30,6 +30,7 @@ MAY_IMPORT = {
     "paths": GROUND | {"spatial"},
     "model": ROBOT - {"model"},
     "tasks": ROBOT | {"algebra"},
+    "constraints": ROBOT | {"algebra"},
     "objectives": ROBOT | {"algebra"},
     "analysis": ROBOT | {"algebra", "tasks"},
     "levels": JOINED - {"levels"},

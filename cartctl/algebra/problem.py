@@ -7,7 +7,7 @@ Satisfy ``A_k u + d_k = s_k b_k`` as well as priorities and bounds allow, then m
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -83,12 +83,51 @@ class Equation:
         """``b - d``: what A u has to become when nothing is scaled."""
         return self.b if self.drift is None else self.b - self.drift
 
+    def miss(self, u: FloatArray, s: float) -> FloatArray:
+        """``A u + d - s b``, (m,)."""
+        drift = 0.0 if self.drift is None else self.drift
+        return self.A @ u + drift - s * self.b
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Inequality:
+    """``lower <= A u <= upper`` at a priority of its own: kept, or missed by as little as what ranks above allows.
+
+    A: (m, n). lower, upper: (m,) or None, +-inf allowed. name: shown in reports. It stands among a Problem's equations,
+    for solvers that honour it (``hqp``); hard rows that outrank every equation are the Problem's ``constraints``.
+
+    Raises ShapeError, NonFiniteError, ProblemError.
+    """
+
+    A: FloatArray
+    lower: Any = None
+    upper: Any = None
+    name: str = ""
+    fit: str = field(default="inequality", init=False)
+    weight: float = field(default=1.0, init=False)
+
+    def __post_init__(self) -> None:
+        label = f"inequality {self.name!r}: " if self.name else "inequality: "
+        put = object.__setattr__
+        put(self, "A", checks.matrix(label + "A", self.A))
+        rows = self.A.shape[0]
+        for name, open_side in (("lower", -np.inf), ("upper", np.inf)):
+            given = getattr(self, name)
+            bound = np.full(rows, open_side) if given is None else given
+            put(self, name, checks.vector(label + name, bound, rows, infinite=True))
+        _ordered(label + "lower", self.lower, label + "upper", self.upper)
+
+    def miss(self, u: FloatArray, s: float) -> FloatArray:
+        """How far each row of A u is outside its interval, signed, (m,)."""
+        x = self.A @ u
+        return np.minimum(x - self.lower, 0.0) + np.maximum(x - self.upper, 0.0)  # type: ignore[no-any-return]
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Problem:
     """Equations in order of priority (highest first), bounds, metric and reference.
 
-    equations: a sequence of Equation or ``(A, b)`` with A (m_k, n) and b (m_k,).
+    equations: a sequence of Equation or ``(A, b)`` with A (m_k, n) and b (m_k,); an Inequality may stand among them.
     lower, upper: (n,) or None, +-inf allowed. constraints: ``(C, c_lower, c_upper)`` with C (r, n) or None.
     metric: W as (n,) positive or (n, n) symmetric positive definite; None is the identity.
     reference: u0 (n,); None is zero.
@@ -122,14 +161,20 @@ class Problem:
 
     @classmethod
     def trusted(
-        cls, equations: tuple[Equation, ...], metric: FloatArray | None, reference: FloatArray | None
+        cls,
+        equations: tuple[Equation, ...],
+        metric: FloatArray | None,
+        reference: FloatArray | None,
+        lower: FloatArray | None = None,
+        upper: FloatArray | None = None,
+        constraints: tuple[FloatArray, FloatArray, FloatArray] | None = None,
     ) -> Problem:
-        """An unbounded problem without checks or copies, for levels whose arrays are known to be good."""
+        """A problem without checks or copies, for levels whose arrays are known to be good."""
         self = _new(cls)
         _set_equations(self, equations)
-        _set_lower(self, None)
-        _set_upper(self, None)
-        _set_constraints(self, None)
+        _set_lower(self, lower)
+        _set_upper(self, upper)
+        _set_constraints(self, constraints)
         _set_metric(self, metric)
         _set_reference(self, reference)
         return self
@@ -168,8 +213,8 @@ _set_equations, _set_lower, _set_upper, _set_constraints, _set_metric, _set_refe
 )
 
 
-def _equations(given: Any) -> tuple[Equation, ...]:
-    if isinstance(given, Equation):
+def _equations(given: Any) -> tuple[Any, ...]:
+    if isinstance(given, Equation | Inequality):
         given = (given,)
     if not isinstance(given, Sequence):
         raise ProblemError(f"equations is a {type(given).__name__}; expected a sequence of Equation or (A, b)")
@@ -185,8 +230,8 @@ def _equations(given: Any) -> tuple[Equation, ...]:
     return equations
 
 
-def _equation(k: int, given: Any) -> Equation:
-    if isinstance(given, Equation):
+def _equation(k: int, given: Any) -> Equation | Inequality:
+    if isinstance(given, Equation | Inequality):
         return given
     if not isinstance(given, Sequence) or len(given) != 2:
         raise ProblemError(f"equation {k} is a {type(given).__name__}; expected an Equation or a pair (A, b)")

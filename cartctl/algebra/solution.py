@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from enum import Enum
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from cartctl.algebra.problem import Equation, Problem
+from cartctl.algebra.certificate import Certificate
+from cartctl.algebra.problem import Equation, Inequality, Problem
 from cartctl.algebra.svd import norm, scale
 from cartctl.checks import FloatArray
+from cartctl.errors import UnsupportedProblem
 
 
 class Status(Enum):
@@ -24,9 +27,17 @@ class Status(Enum):
         "More rows are stacked than there are unknowns, so the added tasks disturb the first; "
         "add at most n - m rows, or rank the tasks with task-priority."
     )
+    SKIPPED = (
+        "A task has no feasible scale and was left out (its scale is nan), the others were not; "
+        "lower its drift, widen the bounds, or fit it by least squares."
+    )
     INFEASIBLE = (
-        "No scale of the commands keeps the bounds; u is the answer without commands, clipped into the box; "
+        "The bounds, constraint rows and commands contradict each other even at rest; u keeps the box, and "
         "bound_violation() says by how much constraint rows are missed."
+    )
+    RECOVERING = (
+        "A joint is outside a limit, or too fast to stop in time, and is being brought back at a bounded rate; "
+        "the tasks get what is left."
     )
     SINGULAR = (
         "A task lost rank here: motion in the lost directions is left out or damped; "
@@ -50,13 +61,16 @@ class Method(Protocol):
     def task_part(self, solution: Solution) -> FloatArray:
         """What of the answer the tasks ask for."""
 
+    def certify(self, solution: Solution) -> Certificate:
+        """The residuals of what the method claims."""
+
 
 class Solution:
     """The answer of one solver to one problem.
 
-    u: (n,). scales: (p,) in [0, 1], 1 where the method does not scale. saturated: (n,) -1 at the lower bound, +1 at
-    the upper, 0 free; saturated_rows the same for constraint rows. lost_rank: whether a task's matrix lost rank. The
-    status, residuals, parts and multipliers are worked out when asked for.
+    u: (n,). scales: (p,) in [0, 1], 1 where the method does not scale, nan where a task was skipped. saturated: (n,) -1
+    at the lower bound, +1 at the upper, 0 free; saturated_rows the same for constraint rows. lost_rank: whether a task
+    lost rank. The status, residuals, parts, multipliers and certificate are worked out when asked for.
     """
 
     __slots__ = (
@@ -69,8 +83,10 @@ class Solution:
         "_task_part",
         "lost_rank",
         "problem",
+        "recovering",
         "solver",
         "u",
+        "warm",
     )
 
     def __init__(
@@ -89,6 +105,8 @@ class Solution:
         self.u = u
         self.solver = solver
         self.lost_rank = lost_rank
+        self.recovering = False  # set by a controller whose limits had to bring a joint back
+        self.warm: Any = None  # what the same solver may start from next time
         self._method = method
         self._status = status
         self._scales = scales
@@ -106,27 +124,26 @@ class Solution:
 
     @property
     def residuals(self) -> FloatArray:
-        """(p,) ``||A_k u + d_k - s_k b_k||``."""
+        """(p,) ``||A_k u + d_k - s_k b_k||``; of a skipped task what is missing at s = 1, of an inequality the miss."""
         if self._residuals is None:
-            pairs = zip(self.problem.equations, self.scales, strict=True)
-            rows = [e.A @ self.u + (0.0 if e.drift is None else e.drift) - s * e.b for e, s in pairs]
-            self._residuals = np.nan_to_num([norm(r) for r in rows], nan=np.inf, posinf=np.inf)
+            pairs = zip(self.problem.equations, np.nan_to_num(self.scales, nan=1.0), strict=True)
+            self._residuals = np.nan_to_num([norm(e.miss(self.u, s)) for e, s in pairs], nan=np.inf, posinf=np.inf)
         return self._residuals
 
     @property
     def saturated(self) -> NDArray[np.int8]:
         """(n,) -1 at lower, +1 at upper, 0 free."""
         if self._saturated is None:
-            self._saturated = np.zeros(self.problem.n, dtype=np.int8)
+            self._saturated = _sides(self.u, self.problem.lower, self.problem.upper)
         return self._saturated
 
     @property
     def saturated_rows(self) -> NDArray[np.int8]:
         """(r,) the same for the rows of the constraints."""
-        if self._saturated_rows is not None:
-            return self._saturated_rows
-        rows = 0 if self.problem.constraints is None else self.problem.constraints[0].shape[0]
-        return np.zeros(rows, dtype=np.int8)
+        if self._saturated_rows is None:
+            C, low, high = self.problem.constraints or (np.zeros((0, self.problem.n)), None, None)
+            self._saturated_rows = _sides(C @ self.u, low, high)
+        return self._saturated_rows
 
     @property
     def status(self) -> Status:
@@ -134,13 +151,19 @@ class Solution:
         if self._status is None:
             by_residuals = Status.OPTIMAL if self.met else Status.INEXACT
             self._status = by_residuals if self._method is None else self._method.grade(self)
+        if self.recovering and self._status is not Status.FAILED:
+            return Status.RECOVERING
         return self._status
 
     @property
     def met(self) -> bool:
         """Whether every equation of positive weight holds, up to what round-off may leave."""
+        return self.holds()
+
+    def holds(self, fits: Sequence[str] = ("scale", "least_squares", "inequality")) -> bool:
+        """The same of the equations of the given fits only; a skipped one does not hold."""
         pairs = zip(self.problem.equations, self.scales, strict=True)
-        return all(_holds(e, s, self.u) for e, s in pairs if e.weight > 0.0)
+        return all(_holds(e, s, self.u) for e, s in pairs if e.weight > 0.0 and e.fit in fits)
 
     @property
     def task_part(self) -> FloatArray:
@@ -171,6 +194,15 @@ class Solution:
         stacked = np.linalg.lstsq(A.T, force, rcond=None)[0] if A.size else np.zeros(A.shape[0])
         return np.split(stacked, np.cumsum(p.sizes)[:-1])
 
+    def certificate(self) -> Certificate:
+        """Primal and dual residuals of the very statement the solver claims, level by level.
+
+        Raises UnsupportedProblem where the method claims no optimum (damping, gradient steps, heuristics).
+        """
+        if self._method is None:
+            raise UnsupportedProblem(f"solver {self.solver!r} claims no optimum here: status {self.status.name}")
+        return self._method.certify(self)
+
     def bound_violation(self) -> float:
         """The largest amount by which u leaves the problem's bounds or constraint rows; 0 inside."""
         p = self.problem
@@ -188,8 +220,22 @@ class Solution:
         return f"Solution({self.solver}, {self.status.name}, u={np.array2string(self.u, precision=5)})"
 
 
-def _holds(e: Equation, s: float, u: FloatArray) -> bool:
+def _sides(values: FloatArray, lower: FloatArray | None, upper: FloatArray | None) -> NDArray[np.int8]:
+    """-1 at the lower bound, +1 at the upper one, 0 between."""
+    sides = np.zeros(values.shape[0], dtype=np.int8)
+    for bound, side in ((lower, -1), (upper, 1)):
+        if bound is not None:
+            sides[np.abs(values - bound) <= 1e-10 * np.maximum(1.0, np.abs(bound))] = side
+    return sides
+
+
+def _holds(e: Equation | Inequality, s: float, u: FloatArray) -> bool:
     """Whether ``A u + d = s b`` up to what round-off may leave: of each row, and of a backward stable solve."""
+    if isinstance(e, Inequality):
+        finite = np.where(np.isfinite(e.lower), np.abs(e.lower), 0.0) + np.where(np.isfinite(e.upper), e.upper, 0.0)
+        return bool((np.abs(e.miss(u, s)) <= 1e-9 * (np.abs(e.A) @ np.abs(u) + np.abs(finite))).all())
+    if s != s:
+        return False
     rhs = e.rhs if s == 1.0 else s * e.b - (0.0 if e.drift is None else e.drift)
     stable = 64.0 * float(np.finfo(np.float64).eps) * scale(e.A) * norm(u)
     with np.errstate(over="ignore", invalid="ignore"):

@@ -92,7 +92,7 @@ def spends_redundancy(solver: Solver | type[Solver]) -> bool:
 
 def limit_options(solver: Solver, level: str) -> dict[str, Any]:
     """What to tell the controller: off where solver or level honours none, which the header then says."""
-    return {} if "bounds" in solver.honours and get_level(level).shapes_limits else {"limits": None}
+    return {} if "bounds" in solver.honours and get_level(level).bounds is not None else {"limits": None}
 
 
 def has_damping(name: str) -> bool:

@@ -90,7 +90,10 @@ SolverNames = Annotated[
     ),
 ]  # fmt: skip
 LevelName = Annotated[
-    str, typer.Option("--level", metavar="NAME", rich_help_panel=_METHOD, help="What is commanded: velocity.")
+    str,
+    typer.Option(
+        "--level", metavar="NAME", rich_help_panel=_METHOD, help="What is commanded: velocity or acceleration."
+    ),
 ]
 Gain = Annotated[float, typer.Option("--gain", metavar="1/S", rich_help_panel=_METHOD, help="How fast errors decay.")]
 Damping = Annotated[

@@ -1,14 +1,15 @@
-"""Levels: the only bridge between a robot's state and an algebraic problem. Velocity so far."""
+"""Levels: the only bridge between a robot's state and an algebraic problem."""
 
 from __future__ import annotations
 
 from cartctl.errors import LevelNotFound, ParameterError
+from cartctl.levels.acceleration import AccelerationLevel
 from cartctl.levels.base import Command, Level, Secondary
 from cartctl.levels.velocity import VelocityLevel
 
-_REGISTRY: dict[str, type[Level]] = {"velocity": VelocityLevel}
+_REGISTRY: dict[str, type[Level]] = {"velocity": VelocityLevel, "acceleration": AccelerationLevel}
 
-__all__ = ["Command", "Level", "Secondary", "VelocityLevel", "get_level", "levels"]
+__all__ = ["AccelerationLevel", "Command", "Level", "Secondary", "VelocityLevel", "get_level", "levels"]
 
 
 def levels() -> list[str]:

@@ -11,7 +11,10 @@ import numpy as np
 from cartctl.algebra.problem import Problem
 from cartctl.algebra.solution import Solution
 from cartctl.checks import FloatArray, is_finite
-from cartctl.errors import NonFiniteError, ShapeError
+from cartctl.constraints import Box, Constraint, Rows
+from cartctl.errors import NonFiniteError, ParameterError, ShapeError, UnsupportedProblem
+from cartctl.levels.approach import Approach
+from cartctl.levels.bounds import JointBounds
 from cartctl.model.state import State
 from cartctl.objectives.base import Objective
 from cartctl.tasks.base import Reference, Task
@@ -39,6 +42,14 @@ class Command:
         self.acceleration = acceleration
         self.torque = torque
 
+    @property
+    def told(self) -> FloatArray:
+        """The one quantity the robot is told, (nv,): velocity, acceleration or torque; raises ParameterError."""
+        for quantity in (self.velocity, self.acceleration, self.torque):
+            if quantity is not None:
+                return quantity
+        raise ParameterError("the command holds no velocity, acceleration or torque; expected one of them")
+
 
 class Secondary(NamedTuple):
     """What the redundancy is spent on.
@@ -52,23 +63,48 @@ class Secondary(NamedTuple):
     extend: float | None = None
 
 
+class Confines(NamedTuple):
+    """What confines u in this step: a box, each (nv,), and rows ``(C, c_lower, c_upper)``; None where nothing does.
+
+    approach: what makes commands such that the robot can still stop, None where nothing is to be stopped for.
+    """
+
+    lower: FloatArray | None = None
+    upper: FloatArray | None = None
+    rows: tuple[FloatArray, FloatArray, FloatArray] | None = None
+    approach: Approach | None = None
+
+
+UNCONFINED = Confines()
+
+
 class Level(ABC):
     """Velocity, acceleration or torque: what u is, and what A and b are made of."""
 
     name: ClassVar[str]
-    shapes_limits: ClassVar[bool] = False  # whether ``problem`` turns a robot's limits into bounds on u
+    bounds: ClassVar[type[JointBounds] | None] = None  # what turns a robot's limits into bounds on u
+    clocked: ClassVar[bool] = False  # whether a path may wait for a hand that was slowed down
 
     @abstractmethod
     def problem(
         self,
         state: State,
         tasks: Sequence[Task],
-        t: float,
+        times: Sequence[float],
         anchors: Sequence[Any],
         secondary: Secondary,
         metric: FloatArray | None,
+        confines: Confines = UNCONFINED,
     ) -> tuple[Problem, list[Reference]]:
-        """The problem of this instant, and the references it was made from; raises NonFiniteError."""
+        """The problem of this instant, and the references it was made from; times: one a task. NonFiniteError."""
+
+    def rows(self, constraint: Constraint, state: State, dt: float, box: Box | None) -> Rows:
+        """The rows of a constraint on this level's u; raises UnsupportedProblem where the level has none."""
+        raise UnsupportedProblem(f"level {self.name!r} has no rows for a {type(constraint).__name__}")
+
+    def stopping(self, state: State, dt: float) -> FloatArray:
+        """The u that brings every joint to rest within a step, (nv,)."""
+        return np.zeros(state.robot.nv)
 
     @abstractmethod
     def command(self, solution: Solution, references: Sequence[Reference]) -> Command:

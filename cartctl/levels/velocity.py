@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Any, ClassVar
 
 from cartctl.algebra.problem import Equation, Problem
 from cartctl.algebra.solution import Solution
+from cartctl.algebra.svd import norm
 from cartctl.checks import FloatArray
-from cartctl.levels.base import Command, Level, Secondary, direction, require_finite
+from cartctl.constraints import Box, Constraint, Rows
+from cartctl.levels.base import UNCONFINED, Command, Confines, Level, Secondary, direction, require_finite
+from cartctl.levels.bounds import JointBounds
 from cartctl.levels.extremal import extremal_rows
+from cartctl.levels.velocity_bounds import VelocityBounds
 from cartctl.model.state import State
 from cartctl.objectives.base import Objective
 from cartctl.tasks.base import Reference, Task
@@ -19,6 +24,8 @@ class VelocityLevel(Level):
     """u = v (nv,), rad/s or m/s: ``J v = r_dot_ref + K e`` for every task, ``u0 = -k grad H``."""
 
     name: ClassVar[str] = "velocity"
+    bounds: ClassVar[type[JointBounds] | None] = VelocityBounds
+    clocked: ClassVar[bool] = True
 
     def __init__(self) -> None:
         self._scratch: State | None = None
@@ -27,31 +34,38 @@ class VelocityLevel(Level):
         self,
         state: State,
         tasks: Sequence[Task],
-        t: float,
+        times: Sequence[float],
         anchors: Sequence[Any],
         secondary: Secondary,
         metric: FloatArray | None,
+        confines: Confines = UNCONFINED,
     ) -> tuple[Problem, list[Reference]]:
         """The problem of this instant, and the references it was made from; raises NonFiniteError."""
         equations: list[Equation] = []
         references: list[Reference] = []
-        for task, anchor in zip(tasks, anchors):  # noqa: B905 - equally long by construction, and this is the hot loop
+        lower, upper, rows, approach = confines
+        calm = math.inf
+        for task, t, anchor in zip(tasks, times, anchors):  # noqa: B905 - equally long by construction, in a hot loop
             reference = task.reference(state, t, anchor)
             b = task.gain * reference.error
             if reference.rate is not None:
                 b = b + reference.rate
             require_finite(b, f"the command of task {task.name!r}")
             J, size = task.jacobian(state), task.size(state)
+            if approach is not None:
+                b, calm = approach.command(task, state, J, reference, b, lower, upper, calm)
             equations.append(Equation.trusted(J, b, None, task.fit, task.weight, task.name, size))
             references.append(reference)
         objective = secondary.objective
         if objective is None:
-            return Problem.trusted(tuple(equations), metric, None), references
+            return Problem.trusted(tuple(equations), metric, None, lower, upper, rows), references
         if secondary.extend is not None:
             equations.append(self._extremal(state, tasks, objective, secondary.extend))
-            return Problem.trusted(tuple(equations), metric, None), references
+            return Problem.trusted(tuple(equations), metric, None, lower, upper, rows), references
         u0 = secondary.share * direction(objective, state)
-        return Problem.trusted(tuple(equations), metric, u0), references
+        if calm < math.inf:
+            u0 = u0 * min(1.0, calm / max(norm(u0), calm))
+        return Problem.trusted(tuple(equations), metric, u0, lower, upper, rows), references
 
     def _extremal(self, state: State, tasks: Sequence[Task], objective: Objective, gain: float) -> Equation:
         """``A_e v = -K Z^T grad H``."""
@@ -60,6 +74,10 @@ class VelocityLevel(Level):
         rows = extremal_rows(state, tasks, objective, self._scratch)
         require_finite(rows.A, "the objective's Hessian")
         return Equation.trusted(rows.A, -gain * rows.slope, None, "scale", 1.0, "extremal set", 0.0)
+
+    def rows(self, constraint: Constraint, state: State, dt: float, box: Box | None) -> Rows:
+        """The rows of a constraint on v."""
+        return constraint.velocity_rows(state, dt, box)
 
     def command(self, solution: Solution, references: Sequence[Reference]) -> Command:
         """U is the velocity."""

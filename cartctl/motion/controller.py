@@ -10,14 +10,20 @@ from typing import Any
 import numpy as np
 
 from cartctl import checks
+from cartctl.algebra.problem import Problem
+from cartctl.algebra.solution import Solution
 from cartctl.checks import LARGEST, FloatArray, is_moderate
+from cartctl.constraints import Constraint
 from cartctl.errors import CartctlWarning, NoTasksError, ParameterError, ProblemError, UnsupportedProblem
 from cartctl.levels import Command, Level, Secondary, get_level
 from cartctl.levels.metrics import as_state_metric
 from cartctl.model.limits import Limits
 from cartctl.model.robot import Robot
 from cartctl.model.state import State
+from cartctl.motion.clock import PathClocks
+from cartctl.motion.confining import Confining
 from cartctl.motion.extremal_start import onto_extremal_set
+from cartctl.motion.fallback import towards_rest
 from cartctl.motion.limiting import ROBOT_LIMITS, RobotLimits, usable_limits
 from cartctl.objectives.base import Objective
 from cartctl.solvers import Solver, get_solver, solvers_that_honour
@@ -49,6 +55,12 @@ class Controller:
         metric: str | FloatArray | Callable[[State], FloatArray] | None = None,
         dt: float = 1e-3,
         soft_start: float = 0.0,
+        *,
+        constraints: Sequence[Constraint] = (),
+        disabled: str | Sequence[str] = (),
+        jerk: bool = False,
+        path_clock: bool | None = None,
+        approach: bool = True,
     ) -> None:
         if not isinstance(robot, Robot):
             raise ParameterError(f"robot is a {type(robot).__name__}; expected a Robot from cc.load(...)")
@@ -56,7 +68,7 @@ class Controller:
         self.tasks = _checked_tasks(tasks, robot)
         self.solver = get_solver(solver)
         self.level = get_level(level)
-        self.limits = usable_limits(limits, robot, self.solver, self.level)
+        self._limits = usable_limits(limits, robot, self.solver, self.level)
         self.objective = _checked_objective(objective, self.solver)
         self.metric = metric
         self._alone = Secondary()
@@ -66,6 +78,11 @@ class Controller:
         self.soft_start = checks.number("soft_start", soft_start, low=0.0)
         self._metric = as_state_metric(metric, robot.nv)
         self.solver.prepare()
+        self._constraints, self._disabled, self._jerk, self._approach = constraints, disabled, jerk, approach
+        self._confining = self._confined_by(self._limits)
+        self._clocks = PathClocks(_clocked(path_clock, self.tasks, self.solver, self.level))
+        self._last: Solution | None = None
+        self.step_times: list[float] = []  # each task's own time at the last step
         self._state = State(robot)
         self._zeros = np.zeros(robot.nv)
         self._zeros.flags.writeable = False
@@ -76,6 +93,28 @@ class Controller:
         """Forget all that lasts from step to step, as before the first one."""
         self._anchors = None
         self._started = None
+        self._last = None
+        self._clocks.reset()
+        self._confining.reset()
+
+    @property
+    def limits(self) -> Limits | None:
+        """The joint limits in force; assign Limits to change them while running, or None to lift them."""
+        return self._limits
+
+    @limits.setter
+    def limits(self, limits: Limits | None) -> None:
+        limits = usable_limits(limits, self.robot, self.solver, self.level)
+        self._confining = self._confined_by(limits)
+        self._limits = limits
+
+    def _confined_by(self, limits: Limits | None) -> Confining:
+        given = (self._constraints, self._disabled, self._jerk, self._approach)
+        return Confining(self.robot, self.level, self.solver, limits, *given, self.dt)
+
+    def times(self, t: float) -> list[float]:
+        """Each task's own time when everybody else's is t: later by what its path has waited."""
+        return self._clocks.times(t)
 
     def start(self, q0: FloatArray) -> FloatArray:
         """Where a rollout from q0 (nq,) begins: q0, or for a solver that keeps an objective extremal, on that set.
@@ -98,9 +137,25 @@ class Controller:
         metric = self._metric if self._metric is None or isinstance(self._metric, np.ndarray) else self._metric(state)
         started = t if self._started is None else self._started
         secondary = self._alone if self.objective is None else self._secondary(t - started)
-        problem, references = self.level.problem(state, self.tasks, t, anchors, secondary, metric)
+        times = self._clocks.times(t)
+        confines = self._confining.at(state)
+        problem, references = self.level.problem(state, self.tasks, times, anchors, secondary, metric, confines)
+        solution = self._solve(problem, state)
         self._anchors, self._started = anchors, started  # only now: a refused step leaves no trace
-        return self.level.command(self.solver.solve(problem), references)
+        self._last = solution
+        self.step_times = times
+        self._clocks.tick(t, times, problem.equations, solution.u)
+        return self.level.command(solution, references)
+
+    def _solve(self, problem: Problem, state: State) -> Solution:
+        """The solver's answer, from the last one; a task with no feasible scale is slowed towards standing still."""
+        solution = self.solver.solve(problem, self._last)
+        scales = solution.scales
+        if (scales != scales).any():
+            again = towards_rest(problem, scales != scales, self.level.stopping(state, self.dt))
+            solution = self.solver.solve(again, solution)
+        solution.recovering = self._confining.recovering
+        return solution
 
     def _secondary(self, elapsed: float) -> Secondary:
         """The objective, its share rising as 3 x^2 - 2 x^3 over the soft start."""
@@ -145,6 +200,14 @@ def _checked_tasks(tasks: Task | Sequence[Task], robot: Robot) -> tuple[Task, ..
             raise ProblemError(f"tasks[{k}] is a {type(task).__name__}; expected a Task")
         task.check(robot)
     return tuple(tasks)
+
+
+def _clocked(asked: bool | None, tasks: Sequence[Task], solver: Solver, level: Level) -> list[bool]:
+    """Which tasks have a path that waits: by default every one, where the solver scales and the level can."""
+    if asked and not level.clocked:
+        raise UnsupportedProblem(f"level {level.name!r} has no path clock; use level 'velocity', or path_clock=False")
+    waits = level.clocked and (solver.scales if asked is None else asked)
+    return [bool(waits) for _ in tasks]
 
 
 def _checked_objective(objective: Objective | None, solver: Solver) -> Objective | None:

@@ -13,6 +13,8 @@ import pyarrow.parquet
 from cartctl.files import whole_file
 from cartctl.motion.run import Run
 
+_COMMANDS = {"acceleration": "acceleration command", "torque": "torque command"}  # velocities are the plain "command"
+
 
 def table(run: Run) -> pa.Table:
     """A pyarrow Table; what belongs to a step is null in the row after the last one."""
@@ -20,7 +22,8 @@ def table(run: Run) -> pa.Table:
     columns |= {f"q{i}": run.q[:, i] for i in range(run.q.shape[1])}
     joints = run.meta.get("joints") or [f"dof{i}" for i in range(run.v.shape[1])]
     columns |= {f"v {name}": run.v[:, i] for i, name in enumerate(joints)}
-    columns |= {f"command {name}": _padded(run.command[:, i]) for i, name in enumerate(joints)}
+    told = _COMMANDS.get(str(run.meta.get("level")), "command")
+    columns |= {f"{told} {name}": _padded(run.command[:, i]) for i, name in enumerate(joints)}
     for task in run.tasks:
         for i, unit in enumerate(task.units):
             columns[f"{task.name} error{i}" + (f" [{unit}]" if unit else "")] = task.error[:, i]

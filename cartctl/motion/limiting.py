@@ -25,7 +25,7 @@ def usable_limits(limits: Limits | RobotLimits | None, robot: Robot, solver: Sol
     """The limits to work under; raises UnsupportedProblem, ParameterError, ShapeError."""
     if limits is None:
         return None
-    able = "bounds" in solver.honours and level.shapes_limits
+    able = "bounds" in solver.honours and level.bounds is not None
     if limits is ROBOT_LIMITS:
         if able:
             return robot.limits

@@ -38,15 +38,16 @@ class Recorder:
     def record(self, k: int, q: FloatArray, v: FloatArray, command: Command, spent: int) -> None:
         """Step k: the state before it, the command, and the time it took in ns."""
         self._q[k], self._v[k] = q, v
-        self._command[k], self._spent[k] = command.velocity, spent * 1e-9
+        self._command[k], self._spent[k] = command.told, spent * 1e-9
         self._status.append(command.solution.status.name)
         solution, controller = command.solution, self._controller
         state = controller.observe(q, v)
+        times = controller.step_times
         for i, (rows, task) in enumerate(zip(self._tasks, controller.tasks, strict=True)):
             rows.error[k] = command.references[i].error
             rows.scale[k] = solution.scales[i]
             rows.singular[k] = singular_values(np.asfortranarray(solution.problem.equations[i].A))
-            rows.see(k, task.observe(state, self.time_of(k), controller.anchors[i]))
+            rows.see(k, task.observe(state, times[i], controller.anchors[i]))
         self._made = k + 1
 
     def close(self, q: FloatArray, v: FloatArray) -> None:
@@ -55,10 +56,11 @@ class Recorder:
         self._q[k], self._v[k] = q, v
         t = self.time_of(k)
         state = controller.observe(q, v, t)
-        for rows, task, anchor in zip(self._tasks, controller.tasks, controller.anchors, strict=True):
-            rows.error[k] = task.reference(state, t, anchor).error
+        times = controller.times(t)
+        for rows, task, anchor, own in zip(self._tasks, controller.tasks, controller.anchors, times, strict=True):
+            rows.error[k] = task.reference(state, own, anchor).error
             rows.singular[k] = singular_values(np.asfortranarray(task.jacobian(state)))
-            rows.see(k, task.observe(state, t, anchor))
+            rows.see(k, task.observe(state, own, anchor))
         self._closed = True
 
     def finish(self, *, interrupted: bool) -> Run:

@@ -42,7 +42,8 @@ class TaskRecord:
 class Run:
     """Every step of a rollout of N steps; made by :func:`cartctl.simulate` or :meth:`load`.
 
-    time (N+1,) s, q (N+1, nq), v (N+1, nv): the states, the last one after the last step. command (N, nv), status (N,),
+    time (N+1,) s, q (N+1, nq), v (N+1, nv): the states, the last one after the last step. command (N, nv): what the
+    level commands, velocities (rad/s, m/s) or accelerations (rad/s^2, m/s^2), by ``meta["level"]``. status (N,),
     solve_time (N,) s: one a step. tasks: a TaskRecord each. meta: robot, solver and its parameters, level, dt, date,
     versions, ``interrupted``.
     """

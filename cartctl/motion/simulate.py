@@ -13,6 +13,7 @@ from cartctl import checks
 from cartctl.checks import FloatArray
 from cartctl.errors import ParameterError, RunInterrupted, TimeStepError
 from cartctl.motion.controller import Controller
+from cartctl.motion.integrate import advance
 from cartctl.motion.recorder import Recorder
 from cartctl.motion.run import Run
 
@@ -34,8 +35,9 @@ def simulate(
 
     A solver that keeps an objective extremal starts on that set (:meth:`Controller.start`).
 
-    Kinematic: the robot moves exactly as commanded, ``q <- q (+) v dt``. The controller is reset first. progress(k, n)
-    is called now and then with steps made and to make. save: a .npz file, written however the rollout ends.
+    Kinematic: the robot moves exactly as commanded, ``q <- q (+) u dt`` by velocities, ``q <- q (+) (v dt + u dt^2/2)``
+    and ``v <- v + u dt`` by accelerations. The controller is reset first. progress(k, n) is called now and then with
+    steps made and to make. save: a .npz file, written however the rollout ends.
 
     Raises RunInterrupted on Ctrl-C, with every step made so far in ``.run``; TimeStepError for a duration that is not
     positive or takes too many steps, and whatever :meth:`Controller.step` raises.
@@ -97,9 +99,7 @@ def _roll(
         command = controller.step(q, v, t)
         spent = perf_counter_ns() - started
         recorder.record(k, q, v, command, spent)
-        assert command.velocity is not None
-        v = command.velocity
-        q = robot.integrate(q, v * dt)
+        q, v = advance(robot, q, v, command, dt)
         if progress is not None and (started - told > _TELL_EVERY * 1e9 or k + 1 == steps):
             told = started
             progress(k + 1, steps)

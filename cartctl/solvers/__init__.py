@@ -28,6 +28,10 @@ _REGISTRY = {
     "singularity-robust-priority": "singularity_robust_priority:SingularityRobustPriority",
     "reverse-priority": "reverse_priority:ReversePriority",
     "task-scaling": "task_scaling:TaskScaling",
+    "sns": "sns:SNS",
+    "sns-greedy": "sns_greedy:SNSGreedy",
+    "qp": "qp:QP",
+    "hqp": "hqp:HQP",
 }
 
 __all__ = [
@@ -55,7 +59,7 @@ def solvers() -> dict[str, str]:
 
 
 def solvers_that_honour(feature: str) -> list[str]:
-    """Names of the registered solvers that honour ``"reference"``, ``"bounds"`` or ``"constraints"``."""
+    """Names of the registered solvers that honour a feature: see :attr:`Solver.honours`."""
     return [name for name in _REGISTRY if feature in solver_class(name).honours]
 
 
@@ -73,14 +77,18 @@ def get_solver(solver: str | Solver | type[Solver]) -> Solver:
     raise ParameterError(f"solver is {solver!r}; expected a name from cc.solvers() or a Solver instance")
 
 
-def solve(problem: Problem, solver: str | Solver | type[Solver] = "pinv") -> Solution:
+def solve(problem: Problem, solver: str | Solver | type[Solver] = "pinv", *, start: Solution | None = None) -> Solution:
     """The answer of ``solver`` to ``problem``.
+
+    start: an earlier Solution, from which a method that can (``sns``, ``hqp``) reaches the same answer sooner.
 
     Raises SolverNotFound, UnsupportedProblem. Numerical trouble is in ``solution.status``.
     """
     if not isinstance(problem, Problem):
         raise ParameterError(f"problem is a {type(problem).__name__}; expected a cc.Problem")
-    return get_solver(solver).solve(problem)
+    if start is not None and not isinstance(start, Solution):
+        raise ParameterError(f"start is a {type(start).__name__}; expected a Solution, or None")
+    return get_solver(solver).solve(problem, start)
 
 
 class _CallableModule(ModuleType):

@@ -15,6 +15,7 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
+from cartctl.algebra.certificate import Certificate
 from cartctl.algebra.metric import Whitening
 from cartctl.algebra.problem import Equation, Problem
 from cartctl.algebra.solution import Solution, Status
@@ -29,12 +30,16 @@ class Solver(ABC):
     name: ClassVar[str]
     stacks: ClassVar[bool] = False  # whether several equations are solved as one
     extends: ClassVar[bool] = False  # whether the level shall add the rows that keep an objective extremal
-    honours: ClassVar[frozenset[str]] = frozenset()  # of "reference", "bounds", "constraints"
+    scales: ClassVar[bool] = False  # whether commands are slowed down, so that a path had better wait
+    honours: ClassVar[frozenset[str]] = frozenset()  # of "reference", "bounds", "constraints", "inequalities"
 
-    def solve(self, problem: Problem) -> Solution:
-        """The answer to ``problem``; raises UnsupportedProblem, never returns NaN."""
+    def solve(self, problem: Problem, start: Solution | None = None) -> Solution:
+        """The answer to ``problem``; raises UnsupportedProblem, never returns NaN.
+
+        start: an earlier Solution; a method that can begin there gives the same answer sooner.
+        """
         self.check(problem)
-        solution = self._solve_impl(problem)
+        solution = self._solve_impl(problem) if start is None else self._solve_from(problem, start)
         u = solution.u
         return solution if u.shape == (problem.n,) and is_finite(u) else self._astray(problem, u)
 
@@ -56,6 +61,9 @@ class Solver(ABC):
     def check(self, problem: Problem) -> None:
         """Refuse what this method would have to ignore."""
         honours = self.honours
+        for e in problem.equations:
+            if e.fit == "inequality" and "inequalities" not in honours:
+                self._refuse("inequalities among the equations", "inequalities", "them as constraints")
         if problem.bounded and "bounds" not in honours:
             self._refuse("bounds on u", "bounds", "problem.without_bounds()")
         if problem.constraints is not None and "constraints" not in honours:
@@ -93,9 +101,19 @@ class Solver(ABC):
         """What of an answer the tasks ask for, (n,): the answer with u0 = 0."""
         return self.solve(solution.problem.without_reference()).u
 
+    def certify(self, solution: Solution) -> Certificate:
+        """The residuals of what the method claims; raises UnsupportedProblem where that is no optimum."""
+        raise UnsupportedProblem(
+            f"solver {self.name!r} claims no optimum that a certificate could show; 'sns', 'hqp' and 'qp' do"
+        )
+
     @abstractmethod
     def _solve_impl(self, problem: Problem) -> Solution:
         """The method itself, on a problem that was checked."""
+
+    def _solve_from(self, problem: Problem, start: Solution) -> Solution:
+        """The same from an earlier answer; most methods have no use for one."""
+        return self._solve_impl(problem)
 
 
 class Answer(NamedTuple):

@@ -34,6 +34,7 @@ class TaskScaling(Solver):
     """
 
     stacks: ClassVar[bool] = True
+    scales: ClassVar[bool] = True
     name: ClassVar[str] = "task-scaling"
     honours: ClassVar[frozenset[str]] = frozenset({"bounds", "constraints", "reference"})
     policy: InversePolicy = field(default_factory=Truncated)

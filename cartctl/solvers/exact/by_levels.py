@@ -99,7 +99,7 @@ def by_levels(
                     _press(w, q)
                     _settle_interval(w, q, first, last, u)
         members = 0
-        if lost:
+        if lost and fits[k] == SCALED:
             flags |= LOST_RANK
         if outcome != MET:
             copy_members(saved, w)

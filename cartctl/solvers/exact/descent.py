@@ -21,11 +21,26 @@ from cartctl.solvers.exact.inequalities import (
     right_side,
     take_in,
 )
-from cartctl.solvers.exact.working_set import FIXED, FREE, KIND, LAM, NUM, SUM, G, H, WorkingSet, Z, combine, place
+from cartctl.solvers.exact.working_set import (
+    FIXED,
+    FREE,
+    KIND,
+    LAM,
+    NUM,
+    SUM,
+    G,
+    H,
+    WorkingSet,
+    Z,
+    combine,
+    noise,
+    place,
+)
 
 SETTLED, STALLED = -1, -2  # else the code of the inequality that cannot be met at this scale
 
 DEPENDENT = 1e-11  # of a unit normal: what is left of it is round-off
+_SURELY = 30.0  # times what round-off may leave
 SMALL = 1e-11  # of the largest coefficient of a combination
 _CLEARLY = 1e-6  # of a unit normal: a guess that adds less is left out
 _LEAST = 1e-3  # coefficients below this are not what others are compared with
@@ -69,8 +84,8 @@ def most_negative(w: WorkingSet) -> int:
 
 @part
 def load(w: WorkingSet, q: Inequalities, start: NDArray[np.int64], s: float) -> None:
-    """Take in a guess of the active inequalities, as far as it is independent; any guess is a valid start."""
-    for k in range(start.shape[0]):
+    """Take in a guess (a count, then codes) of what is active, as far as it is independent; any guess is valid."""
+    for k in range(1, min(start.shape[0], 1 + start[0] if start.shape[0] > 0 else 0)):
         code = start[k]
         if code < 0 or code >> 1 >= q.state.shape[0] or q.state[code >> 1] != OUT or w.K[NUM, 0] >= w.Q.shape[1]:
             continue
@@ -83,11 +98,8 @@ def load(w: WorkingSet, q: Inequalities, start: NDArray[np.int64], s: float) -> 
 
 @part
 def independence(w: WorkingSet) -> float:
-    """The norm above which what is left of a unit normal is more than the round-off of the members' own."""
-    least = 1.0
-    for j in range(w.K[NUM, 0]):
-        least = min(least, w.R[j, j])
-    return min(1e-7, max(DEPENDENT, 1e-15 / least))
+    """The norm above which what is left of the unit normal taken apart last is more than round-off."""
+    return max(DEPENDENT, _SURELY * noise(w))
 
 
 @part

@@ -22,7 +22,7 @@ from cartctl.solvers.exact.proof import write_multipliers
 from cartctl.solvers.exact.scaled import MET
 from cartctl.solvers.exact.working_set import LAM, NUM, H, WorkingSet, Z, combine, orthogonalise
 
-_NOISE = 1e-9  # of the rows' size: singular values below this lead nowhere
+_NOISE = 2e-8  # of the rows' size: singular values below this lead nowhere
 _REST = 1e-11  # of the largest miss: a step that changes the rows by less is none
 _ROUND_OFF = 1e-14  # of what is added up in a row: a miss below this is none
 _PULLS = 1e-10  # of the rows' size times the largest miss: a multiplier below this is none

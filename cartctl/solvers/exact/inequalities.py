@@ -34,7 +34,7 @@ class Inequalities(NamedTuple):
 def right_side(q: Inequalities, code: int) -> float:
     """C of the inequality ``n . u >= c``."""
     i = code >> 1
-    return q.B[0, i] / q.norm[i] if code & 1 == 0 else -q.B[1, i] / q.norm[i]
+    return q.B[0, i] / q.norm[i] if code & 1 == 0 else -q.B[1, i] / q.norm[i]  # type: ignore[no-any-return]
 
 
 @part

@@ -63,7 +63,8 @@ def lexicographic(
     """Fill out (n,), scales (p,), active (count, then codes) and, if it has columns, out_proofs (p + 1, M + n + r).
 
     sizes, fits, scale: rows, kind and natural norm (0: that of A) of each level. d, reference, lower and upper may be
-    empty. Rows of interval levels are the last ones of C, in order. start: codes of inequalities to begin with.
+    empty. Rows of interval levels are the last ones of C, in order. start: a guess of the
+    active inequalities, as ``active`` is.
     """
     n, M, p = out.shape[0], A_.shape[0], sizes.shape[0]
     w, u = new_working_set(n), np.empty(n)

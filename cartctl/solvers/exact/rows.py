@@ -8,7 +8,7 @@ from typing import NamedTuple
 from cartctl.checks import FloatArray
 from cartctl.kernels import part
 from cartctl.solvers.exact.inequalities import Inequalities
-from cartctl.solvers.exact.proof import NOBODY, credit
+from cartctl.solvers.exact.proof import NOBODY, credit, write_proof
 from cartctl.solvers.exact.working_set import (
     C0,
     C1,
@@ -104,11 +104,11 @@ def add_rows(
         if abs(bt) <= _SAME * bt_size:
             if abs(at) <= _SAME * max(at_size, bt_size):
                 continue
-            _prove_row(w, q, e, i, proof)
+            _prove_row(w, q, e, i, pin, at, bt, proof)
             return False, math.nan, pin, lost
         pinned = 0.0 if abs(at) <= _SAME * at_size else at / bt
         if pinned < -END or pinned > 1.0 + END or (pin != NOBODY and abs(pinned - s) > _SAME):
-            _prove_row(w, q, e, i, proof)
+            _prove_row(w, q, e, i, pin, at, bt, proof)
             return False, math.nan, pin, lost
         if pin == NOBODY:
             pin, s = -1 - i, min(1.0, max(0.0, pinned))
@@ -119,10 +119,32 @@ def add_rows(
 
 
 @part
-def _prove_row(w: WorkingSet, q: Inequalities, e: Equations, i: int, proof: FloatArray) -> None:
-    """The combination of members and row i that cancels."""
+def rise(w: WorkingSet, e: Equations, implied: int) -> float:
+    """How the proof's bound rises with s: the slopes of its members and of the implied one."""
+    total = 0.0 if implied >= 0 else e.slope[-1 - implied] / e.norm[-1 - implied]
+    for j in range(w.K[NUM, 0]):
+        total += w.V[Y, j] * w.V[C1, j]
+    return total
+
+
+@part
+def _prove_row(
+    w: WorkingSet, q: Inequalities, e: Equations, i: int, pin: int, at: float, bt: float, proof: FloatArray
+) -> None:
+    """The combination of members and row i that cancels, which reads ``s bt - at > 0`` for every s in question."""
     if proof.shape[0] == 0:
         return
+    share = 0.0
+    if pin != NOBODY:  # another row has pinned s: eliminate it
+        share = -bt / rise(w, e, pin)
+        write_proof(w, q, e.norm, pin, proof)
+        at -= share * (e.base[-1 - pin] / e.norm[-1 - pin])
+        for j in range(w.K[NUM, 0]):
+            at -= share * w.V[Y, j] * w.V[C0, j]
+        bt = 0.0
+    sign = 1.0 if 0.5 * bt - at > 0.0 else -1.0
+    for k in range(proof.shape[0]):
+        proof[k] *= sign * share
     for j in range(w.K[NUM, 0]):
-        credit(q, e.norm, w.K[WHO, j], -w.V[SUM, j], proof)
-    credit(q, e.norm, -1 - i, 1.0, proof)
+        credit(q, e.norm, w.K[WHO, j], -sign * w.V[SUM, j], proof)
+    credit(q, e.norm, -1 - i, sign, proof)

@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 
 from cartctl.checks import FloatArray
 from cartctl.kernels import part
-from cartctl.solvers.exact.descent import DEPENDENT, SMALL, STALLED, largest_coefficient, load, settle
+from cartctl.solvers.exact.descent import SMALL, STALLED, independence, largest_coefficient, load, settle
 from cartctl.solvers.exact.inequalities import EQUAL, IMPLIED, OUT, Inequalities, drop, normal_of, right_side, take_in
 from cartctl.solvers.exact.proof import NOBODY, write_proof
-from cartctl.solvers.exact.rows import END, Equations, add_rows
+from cartctl.solvers.exact.rows import END, Equations, add_rows, rise
 from cartctl.solvers.exact.working_set import (
     C0,
     C1,
@@ -82,6 +82,9 @@ def scaled_level(
         return STALLED, math.nan, lost
     if implied != NOBODY:
         write_proof(w, q, e.norm, implied, proof)
+        if rise(w, e, implied) < 0.0:  # a row that pins s proves both directions
+            for i in range(proof.shape[0]):
+                proof[i] = -proof[i]
     if s < _NOTHING and not pinned:
         s = 0.0
         refill(w, s)
@@ -151,10 +154,8 @@ def _prove_contradiction(
     if proof.shape[0] == 0:
         return
     if implied != NOBODY:
-        rising = 0.0 if implied >= 0 else e.slope[-1 - implied] / e.norm[-1 - implied]
-        falling = 0.0
+        rising, falling = rise(w, e, implied), 0.0
         for j in range(w.K[NUM, 0]):
-            rising += w.V[Y, j] * w.V[C1, j]
             falling += w.V[SUM, j] * w.V[C1, j]
         if rising != 0.0:
             share = falling / rising
@@ -179,7 +180,7 @@ def _freeze(w: WorkingSet, q: Inequalities, implied: int, first: int, s: float) 
     if found >= 0:
         remove(w, found)
         left = normal_of(q, implied, w)
-        if left > DEPENDENT:
+        if left > independence(w):
             append(w, implied, left, right_side(q, implied), 0.0, s)
     for j in range(w.K[NUM, 0]):
         w.V[C0, j] += s * w.V[C1, j]

@@ -18,6 +18,7 @@ from cartctl.kernels import part
 
 FIXED, FREE, TIED = 0, 1, 2  # an equality; an inequality that may leave; one that the present scale depends on
 
+_EPS = 2.0**-52
 _CANCELLED = 0.3  # of a norm left after one pass: below, a second pass restores orthogonality
 
 
@@ -27,6 +28,7 @@ C0, C1 = 1, 2  # right-hand sides c0 + s c1
 Y = 3  # the members' share in the proof that s cannot be larger
 LAM = 4  # multipliers
 H, SUM, Z = 5, 6, 7  # scratch: a normal's components along Q; as a sum of members; what of it is orthogonal to them
+ERR = 8  # by how much round-off may have turned a row of Q
 
 # Rows of K.
 WHO, KIND = 0, 1  # an inequality's code or -1 - row of an equation; FIXED, FREE or TIED
@@ -38,7 +40,7 @@ class WorkingSet(NamedTuple):
 
     Q: FloatArray  # (n + 1, n)
     R: FloatArray  # (n + 1, n + 1)
-    V: FloatArray  # (8, n + 1)
+    V: FloatArray  # (9, n + 1)
     K: NDArray[np.int64]  # (3, n + 1)
 
 
@@ -46,7 +48,7 @@ class WorkingSet(NamedTuple):
 def new_working_set(n: int) -> WorkingSet:
     """An empty one in R^n."""
     return WorkingSet(
-        np.empty((n + 1, n)), np.empty((n + 1, n + 1)), np.zeros((8, n + 1)), np.zeros((3, n + 1), np.int64)
+        np.empty((n + 1, n)), np.empty((n + 1, n + 1)), np.zeros((9, n + 1)), np.zeros((3, n + 1), np.int64)
     )
 
 
@@ -94,7 +96,22 @@ def append(w: WorkingSet, who: int, left: float, c0: float, c1: float, s: float)
     for k in range(Q.shape[1]):
         Q[q, k] = z[k] / left
     w.K[WHO, q], w.K[KIND, q], w.V[C0, q], w.V[C1, q], w.V[Y, q], w.V[LAM, q] = who, FIXED, c0, c1, 0.0, 0.0
+    w.V[ERR, q] = noise(w) / left
     w.K[NUM, 0] = q + 1
+
+
+@part
+def noise(w: WorkingSet) -> float:
+    """What round-off may leave of the normal whose components are h, if it depends on the members.
+
+    A row of Q that was left over from a nearly dependent normal points somewhere else by as much as that was near, and
+    passes its error on to those taken apart by it.
+    """
+    h, err = w.V[H], w.V[ERR]
+    total = _EPS * _EPS
+    for i in range(w.K[NUM, 0]):
+        total += (h[i] * err[i]) ** 2
+    return math.sqrt(total)
 
 
 @part
@@ -121,6 +138,12 @@ def remove(w: WorkingSet, k: int) -> None:
             Q[i, j], Q[i + 1, j] = cos * a + sin * b, cos * b - sin * a
         a, b = g[i], g[i + 1]
         g[i], g[i + 1] = cos * a + sin * b, cos * b - sin * a
+    err = w.V[ERR]
+    for j in range(k, q - 1):
+        total = _EPS * _EPS
+        for i in range(j):
+            total += (R[j, i] * err[i]) ** 2
+        err[j] = math.sqrt(total) / R[j, j]
     w.K[NUM, 0] = q - 1
 
 
@@ -170,6 +193,6 @@ def copy_members(source: WorkingSet, target: WorkingSet) -> None:
         for i in range(j + 1):
             target.R[j, i] = source.R[j, i]
         target.K[WHO, j], target.K[KIND, j] = source.K[WHO, j], source.K[KIND, j]
-        for i in (G, C0, C1, Y, LAM):
+        for i in (G, C0, C1, Y, LAM, ERR):
             target.V[i, j] = source.V[i, j]
     target.K[NUM, 0] = q

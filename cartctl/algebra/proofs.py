@@ -1,0 +1,269 @@
+"""Checking multipliers against a claim, by nothing but sums over the problem's own rows.
+
+Every level of a prioritised problem has a vector z over its equation rows, joints and constraint rows for which
+``sum_r z_r a_r + z_box + C^T z_C`` cancels (at the last level: equals W (u - u0)). With z_i >= 0 only where a lower
+bound is attained and z_i <= 0 only at an upper one, any feasible u', s' obeys
+
+    h(s') = sum_r z_r rhs_r(s') + sum_i z_i bound_i <= 0,    rhs = s b - d,
+
+which is Farkas' lemma: with slope h1 > 0 no s can exceed -h0 / h1, and where h > 0 on all of [0, 1] none is feasible.
+Of a fitted level z holds minus the misses on its own rows, and the same cancellation is its stationarity.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cartctl.checks import FloatArray
+from cartctl.kernels import kernel, part
+
+SCALED, FITTED, INTERVAL = 0, 1, 2
+PRIMAL, DUAL, GAP = 0, 1, 2
+
+_COARSE = 1e-6  # of a fitted level's rows: misses below this are judged as if they were this large
+
+
+@kernel(
+    "void(matrix, vector, vector, ints, ints, vector, vector, matrix, vector, vector, vector, vector, vector, "
+    "out_matrix, out_matrix)",
+    fast=True,
+)
+def check_proofs(
+    A: FloatArray,
+    b: FloatArray,
+    d: FloatArray,
+    sizes: NDArray[np.int64],
+    fits: NDArray[np.int64],
+    lower: FloatArray,
+    upper: FloatArray,
+    C: FloatArray,
+    c_lower: FloatArray,
+    c_upper: FloatArray,
+    force: FloatArray,
+    u: FloatArray,
+    scales: FloatArray,
+    z: FloatArray,
+    residuals: FloatArray,
+) -> None:
+    """Fill residuals (p + 1, 3) with primal, dual and gap of every level, from multipliers z (p + 1, M + n + r).
+
+    force: W (u - u0), (n,). Bounds may be empty. z is completed by the misses and by earlier levels: a multiple of
+    what cancels anyway turns the sign of an inequality that such a level made an equality.
+    """
+    n, M, r, p = u.shape[0], A.shape[0], C.shape[0], sizes.shape[0]
+    x, low, high, norm = np.empty(M + n + r), np.empty(M + n + r), np.empty(M + n + r), np.ones(M + n + r)
+    level = np.empty(M + n + r, np.int64)
+    size = _rows(A, b, d, sizes, fits, lower, upper, C, c_lower, c_upper, u, scales, x, low, high, norm, level)
+    for k in range(p + 1):
+        own = z[k]
+        if k < p and fits[k] != SCALED:
+            for i in range(M + n + r):
+                if level[i] == k:
+                    own[i] -= min(x[i] - low[i], 0.0) + max(x[i] - high[i], 0.0)
+        for j in range(k - 1, -1, -1):
+            if scales[j] == scales[j]:
+                _turn(own, z[j], x, low, high, level, j)
+        rest, terms = _stationarity(A, C, own, norm, n, force, k == p)
+        slack, value, slope = _value(own, x, low, high, level, b, k, norm)
+        if k < p and fits[k] != SCALED:
+            terms = max(terms, _COARSE * _weight(x, low, high, norm, level, k, size))
+        residuals[k, DUAL] = rest / terms if terms > 0.0 else 0.0
+        residuals[k, PRIMAL] = 0.0  # a fitted or skipped level promises nothing of its own rows
+        if k == p or (fits[k] == SCALED and scales[k] == scales[k]):
+            residuals[k, PRIMAL] = _primal(x, low, high, norm, level, k, p, size)
+        residuals[k, GAP] = 0.0
+        if k == p or fits[k] != SCALED:
+            residuals[k, GAP] = slack / (terms * size) if terms * size > 0.0 else 0.0
+        elif scales[k] != scales[k]:
+            at_zero = value - slope
+            margin = min(value, at_zero)
+            residuals[k, GAP] = 0.0 if margin > 0.0 else 1.0 - margin
+        elif scales[k] < 1.0:
+            residuals[k, GAP] = abs(value) / slope if slope > 0.0 else np.inf
+
+
+@part
+def _rows(
+    A: FloatArray,
+    b: FloatArray,
+    d: FloatArray,
+    sizes: NDArray[np.int64],
+    fits: NDArray[np.int64],
+    lower: FloatArray,
+    upper: FloatArray,
+    C: FloatArray,
+    c_lower: FloatArray,
+    c_upper: FloatArray,
+    u: FloatArray,
+    scales: FloatArray,
+    x: FloatArray,
+    low: FloatArray,
+    high: FloatArray,
+    norm: FloatArray,
+    level: NDArray[np.int64],
+) -> float:
+    """Value, interval, norm and level of every row (-1: hard); the size of u that residuals are relative to.
+
+    A skipped level asks for what it asks at s = 1.
+    """
+    n, M, r, p = u.shape[0], A.shape[0], C.shape[0], sizes.shape[0]
+    size = 0.0
+    for i in range(n):
+        size = max(size, abs(u[i]))
+        x[M + i], level[M + i] = u[i], -1
+        low[M + i] = lower[i] if lower.shape[0] > 0 else -np.inf
+        high[M + i] = upper[i] if upper.shape[0] > 0 else np.inf
+    for i in range(M + r):
+        t, length = 0.0, 0.0
+        for k in range(n):
+            entry = A[i, k] if i < M else C[i - M, k]
+            t += entry * u[k]
+            length += entry * entry
+        at = i if i < M else i + n
+        x[at], norm[at], level[at] = t, np.sqrt(length), -1
+        if i >= M:
+            low[at], high[at] = c_lower[i - M], c_upper[i - M]
+    soft = r
+    for k in range(p):
+        soft -= sizes[k] if fits[k] == INTERVAL else 0
+    row, soft = 0, M + n + soft
+    for k in range(p):
+        if fits[k] == INTERVAL:
+            for i in range(soft, soft + sizes[k]):
+                level[i] = k
+            soft += sizes[k]
+            continue
+        s = 1.0 if fits[k] == FITTED or scales[k] != scales[k] else scales[k]
+        for i in range(row, row + sizes[k]):
+            level[i] = k
+            low[i] = s * b[i] - (d[i] if d.shape[0] > 0 else 0.0)
+            high[i] = low[i]
+            if norm[i] > 0.0:
+                size = max(size, 1e-2 * abs(b[i]) / norm[i])
+        row += sizes[k]
+    return size
+
+
+@part
+def _equality(level: int, k: int, x: float, low: float, high: float) -> bool:
+    """Whether a row is an equality for level k: of a level above that is one, or that could not be met."""
+    return low == high or (0 <= level < k and (x < low or x > high))
+
+
+@part
+def _turn(
+    own: FloatArray,
+    earlier: FloatArray,
+    x: FloatArray,
+    low: FloatArray,
+    high: FloatArray,
+    level: NDArray[np.int64],
+    j: int,
+) -> None:
+    """Add so much of what cancels at level j that the inequalities in it have the sign of the bound they are at."""
+    share = 0.0
+    for i in range(x.shape[0]):
+        if earlier[i] == 0.0 or own[i] == 0.0 or _equality(level[i], j, x[i], low[i], high[i]):
+            continue
+        sign = 1.0 if x[i] - low[i] < high[i] - x[i] else -1.0
+        if sign * own[i] < 0.0 and sign * earlier[i] > 0.0:
+            share = max(share, -own[i] / earlier[i])
+    if share > 0.0:
+        for i in range(x.shape[0]):
+            own[i] += share * earlier[i]
+
+
+@part
+def _stationarity(
+    A: FloatArray, C: FloatArray, own: FloatArray, norm: FloatArray, n: int, force: FloatArray, last: bool
+) -> tuple[float, float]:
+    """What does not cancel, and the size of the terms."""
+    M = A.shape[0]
+    rest, terms = 0.0, 0.0
+    for k in range(n):
+        t = own[M + k]
+        for i in range(M):
+            t += own[i] * A[i, k]
+        for i in range(C.shape[0]):
+            t += own[M + n + i] * C[i, k]
+        if last:
+            t -= force[k]
+            terms = max(terms, abs(force[k]))
+        rest = max(rest, abs(t))
+    for i in range(own.shape[0]):
+        terms = max(terms, abs(own[i]) * norm[i])
+    return rest, terms
+
+
+@part
+def _weight(
+    x: FloatArray, low: FloatArray, high: FloatArray, norm: FloatArray, level: NDArray[np.int64], k: int, size: float
+) -> float:
+    """The size of the gradient's terms if a level's rows were missed by all they are."""
+    largest = 0.0
+    for i in range(x.shape[0]):
+        if level[i] == k:
+            largest = max(largest, norm[i] * max(abs(x[i]), norm[i] * size))
+            for side in (low[i], high[i]):
+                if abs(side) < np.inf:
+                    largest = max(largest, norm[i] * abs(side))
+    return largest
+
+
+@part
+def _value(
+    own: FloatArray,
+    x: FloatArray,
+    low: FloatArray,
+    high: FloatArray,
+    level: NDArray[np.int64],
+    b: FloatArray,
+    k: int,
+    norm: FloatArray,
+) -> tuple[float, float, float]:
+    """Complementarity ``sum |z_i| slack_i``, h at the present scale (1 if skipped) and its slope."""
+    slack, value, slope = 0.0, 0.0, 0.0
+    for i in range(x.shape[0]):
+        if own[i] == 0.0:
+            continue
+        if level[i] == k and i < b.shape[0]:
+            slope += own[i] * b[i]
+            value += own[i] * low[i]
+            continue
+        if _equality(level[i], k, x[i], low[i], high[i]):
+            value += own[i] * (low[i] if level[i] < 0 else x[i])
+            continue
+        if level[i] == k:
+            continue
+        bound = low[i] if own[i] > 0.0 else high[i]
+        if abs(bound) == np.inf:
+            if abs(own[i]) * norm[i] > 1e-12:
+                slack, value = np.inf, np.inf
+            continue
+        slack += abs(own[i] * (x[i] - bound))
+        value += own[i] * bound
+    return slack, value, slope
+
+
+@part
+def _primal(
+    x: FloatArray,
+    low: FloatArray,
+    high: FloatArray,
+    norm: FloatArray,
+    level: NDArray[np.int64],
+    k: int,
+    p: int,
+    size: float,
+) -> float:
+    """What the rows of level k miss (at the last level the hard ones), relative to their size."""
+    worst = 0.0
+    wanted = -1 if k == p else k
+    for i in range(x.shape[0]):
+        if level[i] == wanted:
+            miss = max(max(low[i] - x[i], x[i] - high[i]), 0.0)
+            unit = norm[i] * size + abs(x[i])
+            if miss > 0.0:
+                worst = max(worst, miss / unit)
+    return worst

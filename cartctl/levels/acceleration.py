@@ -1,0 +1,116 @@
+"""Acceleration level: u = a, A = J, b = r_ddot_ref + K_d e_dot + K_p e, drift J_dot v (kinematic)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, ClassVar
+
+import numpy as np
+
+from cartctl import checks
+from cartctl.algebra.problem import Equation, Problem
+from cartctl.algebra.solution import Solution
+from cartctl.checks import FloatArray
+from cartctl.constraints import Box, Constraint, Rows
+from cartctl.errors import ParameterError, ShapeError, UnsupportedProblem
+from cartctl.levels.acceleration_bounds import AccelerationBounds
+from cartctl.levels.base import UNCONFINED, Command, Confines, Level, Secondary, direction, require_finite
+from cartctl.levels.bounds import JointBounds
+from cartctl.model.state import State
+from cartctl.tasks.base import Reference, Task
+
+
+class AccelerationLevel(Level):
+    """u = a (nv,), rad/s^2 or m/s^2: ``J a + J_dot v = r_ddot_ref + K_d e_dot + K_p e`` for every task.
+
+    ``K_p = k^2`` and ``K_d = 2 k`` with a task's gain k in 1/s, a number or one a row: on its own, an error decays
+    critically damped, ``(1 + k t) exp(-k t)``. ``e_dot = r_dot_ref - J v`` is the twist error. A method that scales
+    slows the command and never the drift. ``u0 = -k grad H - D v``; an objective's k is then in rad/s^2 per unit of the
+    gradient.
+
+    damping: D >= 0 in 1/s, a number or (nv,), of motion in the null space, which no task slows; needs a solver that
+    honours a reference. The robot has to move by ``q (+) (v dt + a dt^2/2), v + a dt``.
+
+    Raises ParameterError, NonFiniteError.
+    """
+
+    name: ClassVar[str] = "acceleration"
+    bounds: ClassVar[type[JointBounds] | None] = AccelerationBounds
+
+    def __init__(self, damping: float | FloatArray = 0.0) -> None:
+        self.damping = _damping(damping)
+        self._damps = bool(np.any(self.damping))
+
+    def problem(
+        self,
+        state: State,
+        tasks: Sequence[Task],
+        times: Sequence[float],
+        anchors: Sequence[Any],
+        secondary: Secondary,
+        metric: FloatArray | None,
+        confines: Confines = UNCONFINED,
+    ) -> tuple[Problem, list[Reference]]:
+        """The problem of this instant, and the references it was made from.
+
+        Raises NonFiniteError, ShapeError, and UnsupportedProblem for a method that keeps an objective extremal.
+        """
+        if secondary.extend is not None:
+            raise UnsupportedProblem(
+                "level 'acceleration' has no rows that keep an objective extremal; use level 'velocity', or a solver "
+                "that spends the objective through u0, such as 'projected-gradient'"
+            )
+        equations: list[Equation] = []
+        references: list[Reference] = []
+        for task, t, anchor in zip(tasks, times, anchors, strict=True):
+            reference = task.reference(state, t, anchor)
+            J = task.jacobian(state)
+            b = require_finite(_commanded(task, reference, J, state.v), f"the command of task {task.name!r}")
+            drift = require_finite(task.drift(state), f"the drift of task {task.name!r}")
+            equations.append(Equation.trusted(J, b, drift, task.fit, task.weight, task.name, task.size(state)))
+            references.append(reference)
+        u0 = self._reference(state, secondary)
+        lower, upper, rows, _ = confines
+        return Problem.trusted(tuple(equations), metric, u0, lower, upper, rows), references
+
+    def _reference(self, state: State, secondary: Secondary) -> FloatArray | None:
+        """``u0 = -k grad H - D v`` (nv,), None where there is neither."""
+        braking = -self._spread(state.robot.nv) * state.v if self._damps else None
+        if secondary.objective is None:
+            return braking
+        u0 = secondary.share * direction(secondary.objective, state)
+        return u0 if braking is None else u0 + braking
+
+    def _spread(self, nv: int) -> float | FloatArray:
+        if isinstance(self.damping, np.ndarray) and self.damping.shape != (nv,):
+            raise ShapeError(f"damping has shape {self.damping.shape}; expected a number or ({nv},)")
+        return self.damping
+
+    def rows(self, constraint: Constraint, state: State, dt: float, box: Box | None) -> Rows:
+        """The rows of a constraint on a."""
+        return constraint.acceleration_rows(state, dt, box)
+
+    def stopping(self, state: State, dt: float) -> FloatArray:
+        """``-v/dt``."""
+        return -state.v / dt
+
+    def command(self, solution: Solution, references: Sequence[Reference]) -> Command:
+        """U is the acceleration."""
+        return Command(solution, references, acceleration=solution.u)
+
+
+def _commanded(task: Task, reference: Reference, J: FloatArray, v: FloatArray) -> FloatArray:
+    """``r_ddot_ref + 2 k (r_dot_ref - J v) + k^2 e`` (m,)."""
+    k = task.gain
+    rate = -(J @ v) if reference.rate is None else reference.rate - J @ v
+    b = k * (2.0 * rate + k * reference.error)
+    return b if reference.acceleration is None else b + reference.acceleration
+
+
+def _damping(damping: Any) -> float | FloatArray:
+    if np.ndim(damping) == 0:
+        return checks.number("damping", damping, low=0.0)
+    array = checks.vector("damping", damping)
+    if (array < 0.0).any():
+        raise ParameterError(f"damping is {array}; expected numbers of at least 0, in 1/s")
+    return array

@@ -1,0 +1,122 @@
+"""Commands such that the robot can still stop: for the target, and for the edge of the workspace.
+
+A feedback K e that ignores how fast joints can slow down overshoots its target, and at the edge of the workspace, where
+a singular value vanishes, a command outwards is followed by reversals for good. Along each singular direction of the
+task's Jacobian, ``J v_i = sigma_i u_i``, with the curvature ``h_i = J_dot(v_i) v_i``:
+
+- the target is ``|u_i . e| / sigma_i`` away, and f of it is the largest speed that stops there at the deceleration a_i
+  that the joints have along v_i (:mod:`cartctl.levels.braking`): ``|u_i . K e| <= sigma_i f(|u_i . e| / sigma_i)``;
+- a target beyond reach pulls by ``-e . h_i > 0``, which adds to the stiffness: one step may not go further than
+  Newton's, ``|u_i . K e| dt <= |u_i . e| sigma_i^2 / (sigma_i^2 - e . h_i / eta)``;
+- the singular configuration is ``theta_i = sigma_i / |u_i . h_i|`` away: towards it
+  ``|u_i . b| <= sigma_i min(f(theta_i), eta theta_i / dt)``.
+
+What ranks below a task at the edge moves no faster than the last of these, for in the null space, too, the task curves.
+On the way back from the edge, an arm bends the way it was bent before. Joints that a limit keeps from doing their part
+are left out of J. Far from edge and target, nothing is changed.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from cartctl.algebra.svd import scale
+from cartctl.checks import FloatArray
+from cartctl.levels.approach_kernel import ASKED, BEND, PULL, SIGMA, directions, hold
+from cartctl.model.limits import Limits
+from cartctl.model.state import State
+from cartctl.tasks.base import Reference, Task
+
+_SHARE = 0.5  # of the acceleration limits: what one direction may count on
+_AT_REST = 1e-6  # of the velocity limit: a bound this close to zero blocks
+_BENT = 1e-3  # of the Jacobian's size: above this singular value it is clear how an arm is bent
+_NOTHING = np.zeros(0)
+
+
+class Approach:
+    """For one robot, its limits and a step of dt seconds.
+
+    scales: whether the solver slows commands down as a whole; for others they are kept below the joints' speeds.
+    """
+
+    def __init__(self, limits: Limits, dt: float, scratch: State, scales: bool) -> None:
+        slowing = _SHARE * np.minimum(limits.acceleration_upper, -limits.acceleration_lower)
+        speed = np.minimum(limits.velocity_upper, -limits.velocity_lower)
+        still = _AT_REST * np.where(np.isfinite(speed), speed, 1.0)
+        self._joints = np.array([slowing, speed, still])
+        self._dt, self._scratch, self._scales = dt, scratch, scales
+        self._bent: dict[int, FloatArray] = {}  # by task: the motion inwards, when it was last clear
+        self._directions, self._hold = directions.compiled, hold.compiled
+
+    def command(
+        self,
+        task: Task,
+        state: State,
+        J: FloatArray,
+        reference: Reference,
+        b: FloatArray,
+        lower: FloatArray | None,
+        upper: FloatArray | None,
+        calm: float,
+    ) -> tuple[FloatArray, float]:
+        """``b`` (m,) held back along directions in which the robot could not stop in time; the calm for what is below.
+
+        calm: the largest speed of joints, in the norm of v, that the tasks above leave to this one.
+        """
+        below = calm
+        if J.shape[0] and task.fit == "scale":
+            b, edge = self._held(task, state, J, reference, b, lower, upper)
+            below = min(calm, edge)
+        return (b if calm == math.inf else calmed(J, b, calm)), below
+
+    def _held(
+        self,
+        task: Task,
+        state: State,
+        J: FloatArray,
+        reference: Reference,
+        b: FloatArray,
+        lower: FloatArray | None,
+        upper: FloatArray | None,
+    ) -> tuple[FloatArray, float]:
+        (m, n), size = J.shape, scale(J)
+        k = min(m, n)
+        U, Vt, D, out = np.empty((m, k)), np.empty((k, n)), np.empty((9, k)), np.empty(m)
+        rate = _NOTHING if reference.rate is None else reference.rate
+        low, high, bounded = (_NOTHING, _NOTHING, False) if lower is None or upper is None else (lower, upper, True)
+        error = reference.error
+        self._directions(J, b, rate, error, self._joints, low, high, self._dt, size, bounded, U, Vt, D)
+        for i in np.flatnonzero(D[ASKED]):
+            self._scratch.set(state.q, Vt[i])
+            h = task.drift(self._scratch)
+            D[BEND, i], D[PULL, i] = U[:, i] @ h, max(0.0, -float(error @ h))
+        edge = self._hold(b, U, D, self._dt, size, self._scales, out)
+        if k and D[BEND, k - 1] != 0.0:
+            self._bend_as_before(task, U[:, k - 1], Vt[k - 1], D[:, k - 1], size, out)
+        return out, edge
+
+    def _bend_as_before(
+        self, task: Task, u: FloatArray, v: FloatArray, d: FloatArray, size: float, out: FloatArray
+    ) -> None:
+        """Send an arm that is asked back from the edge through the singular configuration, if it has come out wrong."""
+        inwards = v if d[BEND] > 0.0 else -v
+        if d[SIGMA] > _BENT * size:
+            self._bent[id(task)] = inwards
+            return
+        before = self._bent.get(id(task))
+        asked = float(u @ out)
+        if before is not None and asked * d[BEND] > 0.0 and float(before @ inwards) < 0.0:
+            through = 2.0 * d[SIGMA] * d[SIGMA] / (abs(d[BEND]) * self._dt)
+            out -= u * (asked + np.copysign(through, asked))
+
+    def reset(self) -> None:
+        """Forget how the arm was bent."""
+        self._bent.clear()
+
+
+def calmed(J: FloatArray, b: FloatArray, calm: float) -> FloatArray:
+    """``b`` slowed down until the least motion that delivers it is no faster than ``calm`` in the norm of v."""
+    fastest = float(np.linalg.norm(np.linalg.lstsq(J, b, rcond=1e-6)[0]))
+    return b * (calm / fastest) if fastest > calm else b

@@ -1,0 +1,221 @@
+"""From a Problem to the engine's arrays, and from its answer to a Solution with a certificate.
+
+The engine minimises ``||u - u0||``; a metric W = L L^T enters by y = L^T u. A diagonal one stretches the box; under a
+full one the box becomes rows, and is restored to the last digit in the end.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cartctl.algebra.certificate import Certificate, LevelCertificate
+from cartctl.algebra.metric import Whitening
+from cartctl.algebra.problem import Problem
+from cartctl.algebra.proofs import check_proofs
+from cartctl.algebra.solution import Solution
+from cartctl.algebra.svd import scale
+from cartctl.checks import FloatArray
+from cartctl.solvers.exact.kinds import FITTED, INTERVAL, SCALED
+from cartctl.solvers.exact.lexicographic import lexicographic
+
+_KINDS = {"scale": SCALED, "least_squares": FITTED, "inequality": INTERVAL}
+_CLAIMS = {SCALED: "scale", FITTED: "least squares", INTERVAL: "least squares"}
+
+_EMPTY = np.zeros(0)
+_NO_ROWS = np.zeros((0, 0))
+_NO_GUESS = np.zeros(1, dtype=np.int64)
+
+
+class Arrays(NamedTuple):
+    """The engine's arguments up to the reference, in its order."""
+
+    A: FloatArray
+    b: FloatArray
+    d: FloatArray
+    sizes: NDArray[np.int64]
+    fits: NDArray[np.int64]
+    natural: FloatArray
+    lower: FloatArray
+    upper: FloatArray
+    C: FloatArray
+    c_lower: FloatArray
+    c_upper: FloatArray
+    reference: FloatArray
+
+
+class Outcome(NamedTuple):
+    """What the engine found."""
+
+    u: FloatArray
+    scales: FloatArray
+    flags: int
+    active: NDArray[np.int64]  # how many inequalities are members, then their codes
+
+
+def answer(problem: Problem, fitted: bool, start: Solution | None) -> Outcome:
+    """The exact answer; fitted: every equation by least squares, whatever its fit says. Raises FloatingPointError."""
+    guess = _NO_GUESS if start is None or start.warm is None else start.warm
+    if problem.metric is None:
+        return _run(arrays_of(problem, fitted), problem.n, guess, _NO_ROWS)
+    white = Whitening(problem.metric)
+    found = _run(whitened(arrays_of(problem, fitted), problem, white), problem.n, guess, _NO_ROWS)
+    u = white.back(found.u)
+    if problem.lower is not None:
+        u = np.maximum(u, problem.lower)
+    if problem.upper is not None:
+        u = np.minimum(u, problem.upper)
+    return found._replace(u=u)
+
+
+def _run(arrays: Arrays, n: int, guess: NDArray[np.int64], proofs: FloatArray) -> Outcome:
+    u, scales = np.empty(n), np.empty(arrays.sizes.shape[0])
+    active = np.empty(n + 2, dtype=np.int64)
+    try:
+        flags = lexicographic.compiled(*arrays, guess, u, scales, active, proofs)
+    except (ValueError, ArithmeticError) as error:  # a singular value decomposition met infinities
+        raise FloatingPointError(str(error)) from None
+    return Outcome(u, scales, flags, active)
+
+
+def arrays_of(problem: Problem, fitted: bool) -> Arrays:
+    """The engine's arguments, metric aside."""
+    equations = problem.equations
+    lower = _EMPTY if problem.lower is None else problem.lower
+    upper = _EMPTY if problem.upper is None else problem.upper
+    C, c_lower, c_upper = problem.constraints or (_NO_ROWS, _EMPTY, _EMPTY)
+    u0 = _EMPTY if problem.reference is None else problem.reference
+    if len(equations) == 1 and equations[0].fit != "inequality":
+        e = equations[0]
+        sizes, fits = _levels((e.A.shape[0],), (FITTED if fitted else _KINDS[e.fit],))
+        natural = _sizes((e.size,))
+        d = _EMPTY if e.drift is None else e.drift
+        return Arrays(e.A, e.b, d, sizes, fits, natural, lower, upper, C, c_lower, c_upper, u0)
+    rows: list[Any] = [e for e in equations if e.fit != "inequality"]
+    kinds = tuple(FITTED if fitted and e.fit == "scale" else _KINDS[e.fit] for e in equations)
+    sizes, fits = _levels(problem.sizes, kinds)
+    natural = _sizes(tuple(0.0 if e.fit == "inequality" else e.size for e in equations))
+    if len(rows) < len(equations):
+        C, c_lower, c_upper = _with_soft_rows(problem, C, c_lower, c_upper)
+    if not rows:
+        return Arrays(_NO_ROWS, _EMPTY, _EMPTY, sizes, fits, natural, lower, upper, C, c_lower, c_upper, u0)
+    A, b = np.concatenate([e.A for e in rows]), np.concatenate([e.b for e in rows])
+    d = _EMPTY
+    if any(e.drift is not None for e in rows):
+        d = np.concatenate([np.zeros(e.b.shape[0]) if e.drift is None else e.drift for e in rows])
+    return Arrays(A, b, d, sizes, fits, natural, lower, upper, C, c_lower, c_upper, u0)
+
+
+def _with_soft_rows(
+    problem: Problem, C: FloatArray, c_lower: FloatArray, c_upper: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """The constraint rows, and behind them those of the inequalities among the equations."""
+    every: tuple[Any, ...] = problem.equations
+    soft = [e for e in every if e.fit == "inequality"]
+    if C.shape[0] == 0:
+        C = np.zeros((0, problem.n))
+    return (
+        np.concatenate([C, *(e.A for e in soft)]),
+        np.concatenate([c_lower, *(e.lower for e in soft)]),
+        np.concatenate([c_upper, *(e.upper for e in soft)]),
+    )
+
+
+@lru_cache(maxsize=256)
+def _levels(sizes: tuple[int, ...], kinds: tuple[int, ...]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    return np.array(sizes, dtype=np.int64), np.array(kinds, dtype=np.int64)
+
+
+@lru_cache(maxsize=1024)
+def _sizes(natural: tuple[float, ...]) -> FloatArray:
+    return np.array(natural)
+
+
+def whitened(arrays: Arrays, problem: Problem, white: Whitening) -> Arrays:
+    """The same problem in y = L^T u."""
+    n = problem.n
+    natural = np.array(
+        [0.0 if e.fit == "inequality" else e.ratio * scale(white.matrix(e.A)) for e in problem.equations]
+    )
+    u0 = arrays.reference if arrays.reference.shape[0] == 0 else white.forward(arrays.reference)
+    C = arrays.C if arrays.C.shape[0] == 0 else white.matrix(arrays.C)
+    A = arrays.A if arrays.A.shape[0] == 0 else white.matrix(arrays.A)
+    assert problem.metric is not None
+    if problem.metric.ndim == 1:
+        root = np.sqrt(problem.metric)
+        low = arrays.lower * root if arrays.lower.shape[0] else _EMPTY
+        high = arrays.upper * root if arrays.upper.shape[0] else _EMPTY
+        return arrays._replace(A=A, natural=natural, lower=low, upper=high, C=C, reference=u0)
+    low = np.full(n, -np.inf) if arrays.lower.shape[0] == 0 else arrays.lower
+    high = np.full(n, np.inf) if arrays.upper.shape[0] == 0 else arrays.upper
+    box = white.matrix(np.eye(n))
+    return arrays._replace(
+        A=A,
+        natural=natural,
+        lower=_EMPTY,
+        upper=_EMPTY,
+        C=box if C.shape[0] == 0 else np.concatenate([box, C]),
+        c_lower=np.concatenate([low, arrays.c_lower]),
+        c_upper=np.concatenate([high, arrays.c_upper]),
+        reference=u0,
+    )
+
+
+def certificate(solution: Solution, fitted: bool) -> Certificate:
+    """Solve once more, asking for multipliers, and check them against the solution itself."""
+    problem = solution.problem
+    n, p = problem.n, len(problem.equations)
+    given = arrays_of(problem, fitted)
+    M, r = given.A.shape[0], given.C.shape[0]
+    if problem.metric is None:
+        proofs = np.zeros((p + 1, M + n + r))
+        _run(given, n, _NO_GUESS, proofs)
+    else:
+        proofs = _proofs_in_metric(given, problem, p)
+    step = solution.u if problem.reference is None else solution.u - problem.reference
+    W = problem.metric
+    force = step if W is None else W * step if W.ndim == 1 else W @ step
+    residuals = np.zeros((p + 1, 3))
+    arguments = (given.A, given.b, given.d, given.sizes, given.fits, given.lower, given.upper)
+    C, c_lower, c_upper = _widened(given, solution.u)
+    check_proofs.compiled(*arguments, C, c_lower, c_upper, force, solution.u, solution.scales, proofs, residuals)
+    levels = []
+    for k in range(p + 1):
+        name = getattr(problem.equations[k], "name", "") if k < p else "reference"
+        claim = _CLAIMS[int(given.fits[k])] if k < p else "nearest"
+        if k < p and np.isnan(solution.scales[k]):
+            claim = "skipped"
+        primal, dual, gap = residuals[k].tolist()
+        levels.append(LevelCertificate(name, claim, primal, dual, gap, proofs[k]))
+    return Certificate(tuple(levels))
+
+
+def _proofs_in_metric(given: Arrays, problem: Problem, p: int) -> FloatArray:
+    """Multipliers of the whitened problem, as those of the rows and bounds they stand for."""
+    n, M, r = problem.n, given.A.shape[0], given.C.shape[0]
+    assert problem.metric is not None
+    arrays = whitened(given, problem, Whitening(problem.metric))
+    if problem.metric.ndim == 1:
+        proofs = np.zeros((p + 1, M + n + r))
+        _run(arrays, n, _NO_GUESS, proofs)
+        proofs[:, M : M + n] *= np.sqrt(problem.metric)
+        return proofs
+    proofs = np.zeros((p + 1, M + n + n + r))  # the box is n rows
+    _run(arrays, n, _NO_GUESS, proofs)
+    return np.delete(proofs, np.s_[M : M + n], axis=1)
+
+
+def _widened(given: Arrays, u: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """The hard rows, as far as they had to yield to the box."""
+    if given.C.shape[0] == 0:
+        return given.C, given.c_lower, given.c_upper
+    hard = given.C.shape[0] - int(given.sizes[given.fits == INTERVAL].sum())
+    x = given.C @ u
+    yields = np.arange(given.C.shape[0]) < hard
+    slack = 1e-9 * (np.abs(given.C) @ np.abs(u))
+    c_lower = np.where(yields & (x < given.c_lower - slack), x, given.c_lower)
+    c_upper = np.where(yields & (x > given.c_upper + slack), x, given.c_upper)
+    return given.C, c_lower, c_upper
