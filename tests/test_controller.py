@@ -127,8 +127,7 @@ class Doubling(cc.Solver):
 def test_a_users_own_solver_and_task_take_the_same_road() -> None:
     robot = planar()
     task = cc.FunctionTask(lambda s: [s.q[0] + s.q[2]], target=[1.0], gain=3.0)
-    with pytest.warns(CartctlWarning, match="level 'velocity' honours no limits"):
-        controller = cc.Controller(robot, task, solver=Doubling())
+    controller = cc.Controller(robot, task, solver=Doubling(), limits=None)
     command = controller.step(np.array([0.1, 0.2, 0.3]))
     np.testing.assert_allclose(command.velocity, [1.8, 0.0, 1.8], atol=1e-6)
     assert cc.solve(command.solution.problem, Doubling).u @ command.velocity > 0

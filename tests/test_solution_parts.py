@@ -32,7 +32,8 @@ def test_the_parts_add_up_and_the_null_part_is_no_task(name, seed, kind):
     A, b, u0 = oracles.matrix(rng, 3, 7), rng.normal(size=3), rng.normal(size=7)
     solution = solve(Problem([(A, b)], metric=oracles.metric(rng, 7, kind), reference=u0), name)
     np.testing.assert_allclose(solution.task_part + solution.null_part, solution.u, atol=tol.EXACT * 10)
-    np.testing.assert_allclose(A @ solution.null_part, 0.0, atol=tol.ORACLE)
+    leak = tol.NEARLY_UNDAMPED * 10 if name == "qp" else tol.ORACLE  # weighs u0 against the task, by 1e-6
+    np.testing.assert_allclose(A @ solution.null_part, 0.0, atol=leak)
     assert np.linalg.norm(solution.null_part) > 1e-3
     np.testing.assert_allclose(
         solution.task_part, solve(solution.problem.without_reference(), name).u, atol=tol.EXACT * 10

@@ -15,13 +15,15 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 
 from cartctl import checks
+from cartctl.algebra.certificate import Certificate
 from cartctl.algebra.problem import Problem
 from cartctl.algebra.solution import Solution, Status
 from cartctl.checks import FloatArray, is_finite
-from cartctl.errors import ParameterError
+from cartctl.errors import ParameterError, UnsupportedProblem
 from cartctl.solvers.base import Solver
 from cartctl.solvers.inequalities import clip, sides_of
 from cartctl.solvers.qp_backends import check_backend, choose, installed, run
+from cartctl.solvers.qp_certificate import weighted_certificate
 from cartctl.solvers.qp_polish import Point, polish
 from cartctl.solvers.qp_program import Program, program_of
 
@@ -113,6 +115,13 @@ class QP(Solver):
         solution = self.solve(problem)
         assert isinstance(solution, QPSolution)
         return solution.duals
+
+    def certify(self, solution: Solution) -> Certificate:
+        """That no u within the bounds costs less: the multipliers of the saddle point, checked on the problem itself."""
+        duals = solution.duals if isinstance(solution, QPSolution) else None
+        if duals is None:
+            raise UnsupportedProblem(f"solver 'qp' claims no optimum here: status {solution.status.name}")
+        return weighted_certificate(solution.problem, duals.u, duals.rho, duals.box, duals.rows)
 
     def grade(self, solution: Solution) -> Status:
         """INEXACT where bounds keep the tasks from being met, more than damping does; else by the residuals."""
