@@ -19,12 +19,14 @@ are left out of J. Far from edge and target, nothing is changed.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
+from typing import NamedTuple
 
 import numpy as np
 
 from cartctl.algebra.svd import scale
 from cartctl.checks import FloatArray
-from cartctl.levels.approach_kernel import ASKED, BEND, PULL, SIGMA, directions, hold
+from cartctl.levels.approach_kernel import ASKED, BEND, FORWARD, PULL, SIGMA, SLOWING, directions, hold
 from cartctl.model.limits import Limits
 from cartctl.model.state import State
 from cartctl.tasks.base import Reference, Task
@@ -32,16 +34,28 @@ from cartctl.tasks.base import Reference, Task
 _SHARE = 0.5  # of the acceleration limits: what one direction may count on
 _AT_REST = 1e-6  # of the velocity limit: a bound this close to zero blocks
 _BENT = 1e-3  # of the Jacobian's size: above this singular value it is clear how an arm is bent
+_BENDS = 0.5  # of what one direction may count on: what a path's bends may take, so that it can also slow down
+_CLEAR = 1e-2  # of the Jacobian's size: damping, for near a singularity a path's bends would ask for it to stand
 _NOTHING = np.zeros(0)
+
+
+class Approached(NamedTuple):
+    """b (m,); the calm left to what ranks below; the share of its rate at which a path that can wait is followed."""
+
+    b: FloatArray
+    calm: float
+    pace: float
 
 
 class Approach:
     """For one robot, its limits and a step of dt seconds.
 
     scales: whether the solver slows commands down as a whole; for others they are kept below the joints' speeds.
+    waiting: the tasks whose paths wait for the hand.
     """
 
-    def __init__(self, limits: Limits, dt: float, scratch: State, scales: bool) -> None:
+    def __init__(self, limits: Limits, dt: float, scratch: State, scales: bool, waiting: Iterable[Task] = ()) -> None:
+        self._waiting = {id(task) for task in waiting}
         slowing = _SHARE * np.minimum(limits.acceleration_upper, -limits.acceleration_lower)
         speed = np.minimum(limits.velocity_upper, -limits.velocity_lower)
         still = _AT_REST * np.where(np.isfinite(speed), speed, 1.0)
@@ -60,16 +74,15 @@ class Approach:
         lower: FloatArray | None,
         upper: FloatArray | None,
         calm: float,
-    ) -> tuple[FloatArray, float]:
-        """``b`` (m,) held back along directions in which the robot could not stop in time; the calm for what is below.
+    ) -> Approached:
+        """``b`` (m,) held back along directions in which the robot could not stop in time.
 
         calm: the largest speed of joints, in the norm of v, that the tasks above leave to this one.
         """
-        below = calm
+        edge, pace = math.inf, 1.0
         if J.shape[0] and task.fit == "scale":
-            b, edge = self._held(task, state, J, reference, b, lower, upper)
-            below = min(calm, edge)
-        return (b if calm == math.inf else calmed(J, b, calm)), below
+            b, edge, pace = self._held(task, state, J, reference, b, lower, upper)
+        return Approached(b if calm == math.inf else calmed(J, b, calm), min(calm, edge), pace)
 
     def _held(
         self,
@@ -80,7 +93,7 @@ class Approach:
         b: FloatArray,
         lower: FloatArray | None,
         upper: FloatArray | None,
-    ) -> tuple[FloatArray, float]:
+    ) -> Approached:
         (m, n), size = J.shape, scale(J)
         k = min(m, n)
         U, Vt, D, out = np.empty((m, k)), np.empty((k, n)), np.empty((9, k)), np.empty(m)
@@ -92,10 +105,38 @@ class Approach:
             self._scratch.set(state.q, Vt[i])
             h = task.drift(self._scratch)
             D[BEND, i], D[PULL, i] = U[:, i] @ h, max(0.0, -float(error @ h))
+        pace = 1.0
+        if id(task) in self._waiting and reference.rate is not None and reference.acceleration is not None:
+            pace = self._pace(task, state, U, D[SIGMA], Vt, reference, size)
+            b = b - (1.0 - pace) * reference.rate
+            D[FORWARD] *= pace
         edge = self._hold(b, U, D, self._dt, size, self._scales, out)
         if k and D[BEND, k - 1] != 0.0:
             self._bend_as_before(task, U[:, k - 1], Vt[k - 1], D[:, k - 1], size, out)
-        return out, edge
+        return Approached(out, edge, pace)
+
+    def _pace(
+        self,
+        task: Task,
+        state: State,
+        U: FloatArray,
+        s: FloatArray,
+        Vt: FloatArray,
+        reference: Reference,
+        size: float,
+    ) -> float:
+        """The share of its speed at which the joints' accelerations can follow the path's bends.
+
+        At the share p they are p^2 times those at full speed, ``J a = r_ddot - J_dot(v) v`` with ``J v = r_dot``.
+        """
+        rate, acceleration = reference.rate, reference.acceleration
+        assert rate is not None and acceleration is not None
+        solve = (Vt.T * (s / (s * s + (_CLEAR * size) ** 2))) @ U.T
+        self._scratch.set(state.q, solve @ rate)
+        bend = np.abs(solve @ (acceleration - task.drift(self._scratch)))
+        with np.errstate(divide="ignore"):
+            room = float(np.min(self._joints[SLOWING] / bend))
+        return min(1.0, math.sqrt(_BENDS * room))
 
     def _bend_as_before(
         self, task: Task, u: FloatArray, v: FloatArray, d: FloatArray, size: float, out: FloatArray

@@ -53,7 +53,8 @@ class VelocityLevel(Level):
             require_finite(b, f"the command of task {task.name!r}")
             J, size = task.jacobian(state), task.size(state)
             if approach is not None:
-                b, calm = approach.command(task, state, J, reference, b, lower, upper, calm)
+                b, calm, pace = approach.command(task, state, J, reference, b, lower, upper, calm)
+                reference = reference if pace == 1.0 else reference._replace(pace=pace)
             equations.append(Equation.trusted(J, b, None, task.fit, task.weight, task.name, size))
             references.append(reference)
         objective = secondary.objective

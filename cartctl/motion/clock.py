@@ -1,7 +1,8 @@
 """A clock for every path: a target waits for a hand that was slowed down, so that it stays on its path.
 
 While a task is delivered at the share s, its own time advances by s dt. s is what was really achieved,
-``s = b . (A u + d) / b . b`` within [0, 1], so the clock runs full time wherever nothing is held back.
+``s = b . (A u + d) / b . b`` within [0, 1], times the pace at which the path was asked for; so the clock runs full time
+wherever nothing is held back.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ from collections.abc import Sequence
 
 from cartctl.algebra.problem import Equation
 from cartctl.checks import FloatArray
+from cartctl.tasks.base import Reference
 
 
 class PathClocks:
@@ -33,14 +35,22 @@ class PathClocks:
         passed = max(t - self._last, 0.0)
         return [t - d - (1.0 - s) * passed for d, s in zip(self._delays, self._shares, strict=True)]
 
-    def tick(self, t: float, times: Sequence[float], equations: Sequence[Equation], u: FloatArray) -> None:
+    def tick(
+        self,
+        t: float,
+        times: Sequence[float],
+        references: Sequence[Reference],
+        equations: Sequence[Equation],
+        u: FloatArray,
+    ) -> None:
         """Take note of a step made at time t: what was commanded, and what u delivers of it."""
         if not self._any:
             return
         self._delays = [t - own for own in times]
         self._last = t
         self._shares = [
-            delivered(e, u) if running else 1.0 for e, running in zip(equations, self._running, strict=False)
+            r.pace * delivered(e, u) if running else 1.0
+            for r, e, running in zip(references, equations, self._running, strict=False)
         ]
 
 

@@ -13,6 +13,7 @@ from cartctl.model.limits import Limits
 from cartctl.model.robot import Robot
 from cartctl.model.state import State
 from cartctl.solvers import Solver, solvers_that_honour
+from cartctl.tasks.base import Task
 
 
 class Confining:
@@ -29,6 +30,7 @@ class Confining:
         jerk: bool,
         approach: bool,
         dt: float,
+        waiting: Sequence[Task],
     ) -> None:
         self._robot, self._level, self._dt = robot, level, dt
         self._constraints = _checked(constraints, robot, solver)
@@ -38,7 +40,9 @@ class Confining:
         if limits is not None:
             assert level.bounds is not None
             self._bounds = level.bounds(limits, dt, joints, jerk, robot.dof_names)
-            self._approach = Approach(limits, dt, State(robot), solver.scales) if approach and level.clocked else None
+            self._approach = (
+                Approach(limits, dt, State(robot), solver.scales, waiting) if approach and level.clocked else None
+            )
         elif joints or jerk:
             what = "disabled" if joints else "jerk"
             raise ParameterError(f"{what} is given without limits; expected limits= for it to be a part of")

@@ -79,8 +79,10 @@ class Controller:
         self._metric = as_state_metric(metric, robot.nv)
         self.solver.prepare()
         self._constraints, self._disabled, self._jerk, self._approach = constraints, disabled, jerk, approach
+        clocked = _clocked(path_clock, self.tasks, self.solver, self.level)
+        self._clocks = PathClocks(clocked)
+        self._waiting = [task for task, waits in zip(self.tasks, clocked, strict=True) if waits]
         self._confining = self._confined_by(self._limits)
-        self._clocks = PathClocks(_clocked(path_clock, self.tasks, self.solver, self.level))
         self._last: Solution | None = None
         self.step_times: list[float] = []  # each task's own time at the last step
         self._state = State(robot)
@@ -110,7 +112,7 @@ class Controller:
 
     def _confined_by(self, limits: Limits | None) -> Confining:
         given = (self._constraints, self._disabled, self._jerk, self._approach)
-        return Confining(self.robot, self.level, self.solver, limits, *given, self.dt)
+        return Confining(self.robot, self.level, self.solver, limits, *given, self.dt, self._waiting)
 
     def times(self, t: float) -> list[float]:
         """Each task's own time when everybody else's is t: later by what its path has waited."""
@@ -144,7 +146,7 @@ class Controller:
         self._anchors, self._started = anchors, started  # only now: a refused step leaves no trace
         self._last = solution
         self.step_times = times
-        self._clocks.tick(t, times, problem.equations, solution.u)
+        self._clocks.tick(t, times, references, problem.equations, solution.u)
         return self.level.command(solution, references)
 
     def _solve(self, problem: Problem, state: State) -> Solution:

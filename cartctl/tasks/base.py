@@ -29,6 +29,7 @@ class Reference(NamedTuple):
     error: FloatArray  # (m,) target minus value
     rate: FloatArray | None = None  # (m,) r_dot_ref
     acceleration: FloatArray | None = None  # (m,) r_ddot_ref
+    pace: float = 1.0  # share of its rate at which a path is followed, where its clock may wait
 
 
 class Observation(NamedTuple):
