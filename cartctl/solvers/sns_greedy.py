@@ -23,7 +23,7 @@ from cartctl.algebra.svd import numerical_rank, round_off, scale, svd
 from cartctl.checks import FloatArray, is_finite
 from cartctl.solvers.base import Solver
 from cartctl.solvers.greedy_kernel import Outcome, Task, most_scaled, nearest
-from cartctl.solvers.inequalities import Inequalities, clip, sides_of
+from cartctl.solvers.inequalities import Inequalities
 
 
 @dataclass(frozen=True)
@@ -57,20 +57,18 @@ class SNSGreedy(Solver):
             except FloatingPointError:  # LAPACK met infinities
                 u = np.full(problem.n, np.nan)
         if not is_finite(u):
-            rest = clip(np.zeros(problem.n), problem.lower, problem.upper)
+            rest = problem.clip(np.zeros(problem.n))
             return Solution(problem, rest, self.name, status=Status.FAILED)
-        u = clip(u, problem.lower, problem.upper)
+        u = problem.clip(u)
         scales = np.array([o.scale for o in outcomes])
-        return Solution(
-            problem, u, self.name, self, _status(problem, outcomes), lost_rank, scales, *sides_of(problem, u)
-        )
+        return Solution(problem, u, self.name, self, _status(problem, outcomes), lost_rank, scales)
 
     def _without_room(self, problem: Problem) -> Solution:
         """Bounds and rows exclude each other: the reference, clipped into the box, no task served."""
         u = np.zeros(problem.n) if problem.reference is None else problem.reference
-        u = clip(u, problem.lower, problem.upper)
+        u = problem.clip(u)
         scales = np.array([np.nan if e.fit == "scale" else 1.0 for e in problem.equations])
-        return Solution(problem, u, self.name, self, Status.INFEASIBLE, False, scales, *sides_of(problem, u))
+        return Solution(problem, u, self.name, self, Status.INFEASIBLE, False, scales)
 
     def task_part(self, solution: Solution) -> FloatArray:
         """What of an answer the tasks ask for, (n,): the answer with u0 = 0."""

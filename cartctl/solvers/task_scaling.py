@@ -10,7 +10,6 @@ from dataclasses import dataclass, field
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from cartctl.algebra.inverses import InversePolicy, Truncated
 from cartctl.algebra.metric import Whitening
@@ -63,14 +62,14 @@ class TaskScaling(Solver):
         low, high = feasible_scales(problem, still, rate)
         slowed = np.array([e.fit == "scale" for e in problem.equations])
         if low > high:
-            u = _clipped(problem, still)
+            u = problem.clip(still)
             stopped = np.where(slowed, 0.0, 1.0)
-            return Solution(problem, u, self.name, self, Status.INFEASIBLE, lost_rank, stopped, *_saturated(problem, u))
+            return Solution(problem, u, self.name, self, Status.INFEASIBLE, lost_rank, stopped)
         if high >= 1.0:
-            return Solution(problem, _clipped(problem, full), self.name, self, None, lost_rank)
-        u = _clipped(problem, still + high * rate)
+            return Solution(problem, problem.clip(full), self.name, self, None, lost_rank)
+        u = problem.clip(still + high * rate)
         scales = np.where(slowed, high, 1.0)
-        return Solution(problem, u, self.name, self, None, lost_rank, scales, *_saturated(problem, u))
+        return Solution(problem, u, self.name, self, None, lost_rank, scales)
 
     def task_part(self, solution: Solution) -> FloatArray:
         """What of an answer the tasks ask for, (n,), at the scale it has."""
@@ -131,23 +130,3 @@ def _ends(problem: Problem, policy: InversePolicy) -> tuple[FloatArray, FloatArr
         full, still = full + rest, still + rest
     lost_rank = policy.rank(decomposition.s, size) < min(A.shape)
     return (full, still, lost_rank) if white is None else (white.back(full), white.back(still), lost_rank)
-
-
-def _clipped(problem: Problem, u: FloatArray) -> FloatArray:
-    if problem.lower is not None:
-        u = np.maximum(u, problem.lower)
-    return u if problem.upper is None else np.minimum(u, problem.upper)
-
-
-def _saturated(problem: Problem, u: FloatArray) -> tuple[NDArray[np.int8], NDArray[np.int8]]:
-    """Which entries of u and which constraint rows sit on a bound: -1 at the lower, +1 at the upper."""
-    C, c_low, c_high = problem.constraints or (np.zeros((0, problem.n)), None, None)
-    return _sides(u, problem.lower, problem.upper), _sides(C @ u, c_low, c_high)
-
-
-def _sides(values: FloatArray, lower: FloatArray | None, upper: FloatArray | None) -> NDArray[np.int8]:
-    sides = np.zeros(values.shape[0], dtype=np.int8)
-    for bound, side in ((lower, -1), (upper, 1)):
-        if bound is not None:
-            sides[np.abs(values - bound) <= 1e-10 * np.maximum(1.0, np.abs(bound))] = side
-    return sides
