@@ -99,14 +99,10 @@ def test_the_reference_is_the_gradient_less_the_damping(damping: float | np.ndar
 def test_what_it_cannot_do_is_refused_in_words() -> None:
     robot = planar()
     task = cc.FrameTask("tool", "xy")
-    extended = cc.Controller(
-        robot, task, "extended-jacobian", "acceleration", limits=None, objective=cc.JointRange(gain=1.0)
-    )
-    with pytest.raises(UnsupportedProblem, match="'velocity'"):
-        extended.step(np.array([0.1, 0.4, 0.5]))
-    damped = cc.Controller(robot, task, "pinv", cc.AccelerationLevel(damping=1.0), limits=None)
-    with pytest.raises(UnsupportedProblem, match="reference"):
-        damped.step(np.zeros(3))
+    with pytest.raises(UnsupportedProblem, match="extremal"):
+        cc.Controller(robot, task, "extended-jacobian", "acceleration", limits=None, objective=cc.JointRange(gain=1.0))
+    with pytest.raises(UnsupportedProblem, match="damping"):
+        cc.Controller(robot, task, "pinv", cc.AccelerationLevel(damping=1.0), limits=None)
     wrong = cc.Controller(robot, task, "dls", cc.AccelerationLevel(damping=[1.0, 2.0]), limits=None)
     with pytest.raises(ShapeError, match="damping"):
         wrong.step(np.zeros(3))

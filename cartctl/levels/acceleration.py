@@ -17,6 +17,7 @@ from cartctl.levels.acceleration_bounds import AccelerationBounds
 from cartctl.levels.base import UNCONFINED, Command, Confines, Level, Secondary, direction, require_finite
 from cartctl.levels.bounds import JointBounds
 from cartctl.model.state import State
+from cartctl.solvers import Solver
 from cartctl.tasks.base import Reference, Task
 
 
@@ -36,10 +37,24 @@ class AccelerationLevel(Level):
 
     name: ClassVar[str] = "acceleration"
     bounds: ClassVar[type[JointBounds] | None] = AccelerationBounds
+    stable_below: ClassVar[float] = 1.0
 
     def __init__(self, damping: float | FloatArray = 0.0) -> None:
         self.damping = _damping(damping)
         self._damps = bool(np.any(self.damping))
+
+    def check(self, solver: Solver) -> None:
+        """Refuse a method that keeps an objective extremal, and damping with one that takes no reference."""
+        if solver.extends:
+            raise UnsupportedProblem(
+                "level 'acceleration' has no rows that keep an objective extremal; use level 'velocity', or a solver "
+                "that spends the objective through u0, such as 'projected-gradient'"
+            )
+        if self._damps and "reference" not in solver.honours:
+            raise UnsupportedProblem(
+                f"solver {solver.name!r} takes no reference for the damping of the null space; use damping=0, or a "
+                "solver that honours one, such as 'sns' or 'projected-gradient'"
+            )
 
     def problem(
         self,
@@ -51,15 +66,7 @@ class AccelerationLevel(Level):
         metric: FloatArray | None,
         confines: Confines = UNCONFINED,
     ) -> tuple[Problem, list[Reference]]:
-        """The problem of this instant, and the references it was made from.
-
-        Raises NonFiniteError, ShapeError, and UnsupportedProblem for a method that keeps an objective extremal.
-        """
-        if secondary.extend is not None:
-            raise UnsupportedProblem(
-                "level 'acceleration' has no rows that keep an objective extremal; use level 'velocity', or a solver "
-                "that spends the objective through u0, such as 'projected-gradient'"
-            )
+        """The problem of this instant, and the references it was made from; raises NonFiniteError, ShapeError."""
         equations: list[Equation] = []
         references: list[Reference] = []
         for task, t, anchor in zip(tasks, times, anchors, strict=True):

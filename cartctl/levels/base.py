@@ -17,6 +17,7 @@ from cartctl.levels.approach import Approach
 from cartctl.levels.bounds import JointBounds
 from cartctl.model.state import State
 from cartctl.objectives.base import Objective
+from cartctl.solvers import Solver
 from cartctl.tasks.base import Reference, Task
 
 
@@ -84,6 +85,11 @@ class Level(ABC):
     name: ClassVar[str]
     bounds: ClassVar[type[JointBounds] | None] = None  # what turns a robot's limits into bounds on u
     clocked: ClassVar[bool] = False  # whether a path may wait for a hand that was slowed down
+    stable_below: ClassVar[float] = 2.0  # gain times dt, from which on the sampled loop diverges
+
+    def check(self, solver: Solver) -> None:
+        """Refuse a solver that the level has no use for, once, when a controller is made."""
+        return
 
     @abstractmethod
     def problem(

@@ -33,12 +33,18 @@ from cartctl.tasks.base import Task
 class Controller:
     """A robot with tasks, highest priority first, resolved by one solver at one level.
 
-    tasks: one Task or more. solver: a name from :func:`cartctl.solvers`, or an instance. level: ``"velocity"``. limits:
-    Limits, None (off), or by default the robot's own where the solver honours bounds, else off with one warning.
+    tasks: one Task or more. solver: a name from :func:`cartctl.solvers`, or an instance. level: ``"velocity"`` or
+    ``"acceleration"``. limits: Limits, None (off), or by default the robot's own where the solver honours bounds, else
+    off with one warning; ``controller.limits`` may be assigned while running.
     objective: an Objective for the null space. metric: None or ``"identity"``, ``"inertia"`` (least kinetic energy),
     ``"joint-limits"`` (Chan & Dubey), an (nv,) or (nv, nv) array, or a function of the State that returns one. dt: s,
     the step it is called with; a gain that cannot be stable at it is a CartctlWarning. soft_start: s over which the
     objective rises to its full share, so that the null space does not start with a jump.
+
+    constraints: Constraints such as ``cc.FrameBox(...)``. disabled: names of joints that brake and stand still. jerk:
+    whether ``limits.jerk_*`` are kept, too. path_clock: whether a path waits for a hand that is slowed down, so that it
+    stays on its path; by default where the solver scales, at the velocity level. approach: whether commands are held
+    back, under limits at the velocity level, so that the robot can stop at its target and at the edge of its reach.
 
     Raises NoTasksError, ProblemError, TimeStepError, FrameNotFound, JointNotFound, SolverNotFound, LevelNotFound,
     UnsupportedProblem, MetricError, ParameterError, NonFiniteError.
@@ -68,13 +74,14 @@ class Controller:
         self.tasks = _checked_tasks(tasks, robot)
         self.solver = get_solver(solver)
         self.level = get_level(level)
+        self.level.check(self.solver)
         self._limits = usable_limits(limits, robot, self.solver, self.level)
         self.objective = _checked_objective(objective, self.solver)
         self.metric = metric
         self._alone = Secondary()
         self._extend = getattr(self.solver, "gain", None) if self.solver.extends else None
         self.dt = checks.duration("dt", dt)
-        _warn_of_unstable_gains(self.tasks, self.dt)
+        _warn_of_unstable_gains(self.tasks, self.dt, self.level.stable_below)
         self.soft_start = checks.number("soft_start", soft_start, low=0.0)
         self._metric = as_state_metric(metric, robot.nv)
         self.solver.prepare()
@@ -232,14 +239,14 @@ def _checked_objective(objective: Objective | None, solver: Solver) -> Objective
     return objective
 
 
-def _warn_of_unstable_gains(tasks: Sequence[Task], dt: float) -> None:
-    """A sampled error shrinks by (1 - k dt) a step: above k dt = 2 it grows."""
+def _warn_of_unstable_gains(tasks: Sequence[Task], dt: float, limit: float) -> None:
+    """A sampled error shrinks by (1 - k dt) a step: above k dt = 2 it grows, with two integrators above 1."""
     for task in tasks:
         gain = float(np.max(task.gain, initial=0.0))
-        if gain * dt >= 2.0:
+        if gain * dt >= limit:
             warnings.warn(
                 f"task {task.name!r}: gain {gain:g} 1/s times dt {dt:g} s is {gain * dt:.3g}; the loop is unstable "
-                f"from 2 on; use a gain below {1.0 / dt:g}, or a smaller dt",
+                f"from {limit:g} on; use a gain below {0.5 * limit / dt:g}, or a smaller dt",
                 CartctlWarning,
                 stacklevel=3,
             )
