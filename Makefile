@@ -4,8 +4,9 @@ VENV   ?= .venv
 BIN    := $(VENV)/bin
 READY  := $(VENV)/.ready
 JOBS   ?= 2
+MINUTES ?= 10
 
-.PHONY: help demo test lint bench docs clean
+.PHONY: help demo test lint bench soak docs clean
 .DEFAULT_GOAL := help
 
 help:  ## what there is
@@ -32,6 +33,9 @@ lint: $(READY)  ## ruff and mypy
 bench: $(READY)  ## the time of one step, as ratios against raw calls in the same run
 	@$(BIN)/python benchmarks/step_time.py
 	@$(BIN)/python benchmarks/solver_time.py
+
+soak: $(READY)  ## random problems and closed loops for MINUTES on all cores, every answer checked
+	@$(BIN)/python benchmarks/soak.py --minutes $(MINUTES)
 
 clean:  ## remove the environment, caches and output
 	rm -rf $(VENV) out .pytest_cache .mypy_cache .ruff_cache .hypothesis build dist

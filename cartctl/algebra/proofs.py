@@ -21,12 +21,15 @@ from cartctl.kernels import kernel, part
 SCALED, FITTED, INTERVAL = 0, 1, 2
 PRIMAL, DUAL, GAP = 0, 1, 2
 
-_COARSE = 1e-6  # of a fitted level's rows: misses below this are judged as if they were this large
+_NOISE = 1e-12  # of the largest multiplier
+_CLEAR = 1e-14  # of the terms of h: a sum this small has no sign
+_MISSED = 1e-10  # relative: an interval missed by less is met
+_COARSE = 1e-4  # of a level's rows, or of u and u0: misses and steps below this are judged as if they were this large
 
 
 @kernel(
-    "void(matrix, vector, vector, ints, ints, vector, vector, matrix, vector, vector, vector, vector, vector, "
-    "out_matrix, out_matrix)",
+    "void(matrix, vector, vector, ints, ints, vector, vector, vector, matrix, vector, vector, vector, float, float, "
+    "vector, vector, out_matrix, out_matrix)",
     fast=True,
 )
 def check_proofs(
@@ -35,12 +38,15 @@ def check_proofs(
     d: FloatArray,
     sizes: NDArray[np.int64],
     fits: NDArray[np.int64],
+    natural: FloatArray,
     lower: FloatArray,
     upper: FloatArray,
     C: FloatArray,
     c_lower: FloatArray,
     c_upper: FloatArray,
     force: FloatArray,
+    pull: float,
+    reach: float,
     u: FloatArray,
     scales: FloatArray,
     z: FloatArray,
@@ -48,37 +54,48 @@ def check_proofs(
 ) -> None:
     """Fill residuals (p + 1, 3) with primal, dual and gap of every level, from multipliers z (p + 1, M + n + r).
 
-    force: W (u - u0), (n,). Bounds may be empty. z is completed by the misses and by earlier levels: a multiple of
-    what cancels anyway turns the sign of an inequality that such a level made an equality.
+    force: W (u - u0), (n,); pull, reach: the size of the terms in it, and of u and u0. Bounds may be empty. z is
+    completed by the misses and by earlier levels: a multiple of what cancels anyway turns the sign of an inequality
+    that such a level made an equality. Rows of later and of skipped levels prove nothing.
     """
     n, M, r, p = u.shape[0], A.shape[0], C.shape[0], sizes.shape[0]
-    x, low, high, norm = np.empty(M + n + r), np.empty(M + n + r), np.empty(M + n + r), np.ones(M + n + r)
+    x, low, high, span = np.empty(M + n + r), np.empty(M + n + r), np.empty(M + n + r), np.ones(M + n + r)
+    given = np.zeros(M + n + r)
     level = np.empty(M + n + r, np.int64)
-    size = _rows(A, b, d, sizes, fits, lower, upper, C, c_lower, c_upper, u, scales, x, low, high, norm, level)
+    rows = (A, b, d, sizes, fits, natural, lower, upper, C, c_lower, c_upper)
+    size = _rows(*rows, u, reach, scales, x, low, high, span, level)
+    for i in range(M):
+        given[i] = abs(b[i]) + (abs(d[i]) if d.shape[0] > 0 else 0.0)
     for k in range(p + 1):
         own = z[k]
+        for i in range(M + n + r):
+            at = level[i]
+            if at > k or (0 <= at < k and scales[at] != scales[at]):
+                own[i] = 0.0
         if k < p and fits[k] != SCALED:
             for i in range(M + n + r):
                 if level[i] == k:
                     own[i] -= min(x[i] - low[i], 0.0) + max(x[i] - high[i], 0.0)
         for j in range(k - 1, -1, -1):
             if scales[j] == scales[j]:
-                _turn(own, z[j], x, low, high, level, j)
-        rest, terms = _stationarity(A, C, own, norm, n, force, k == p)
-        slack, value, slope = _value(own, x, low, high, level, b, k, norm)
-        if k < p and fits[k] != SCALED:
-            terms = max(terms, _COARSE * _weight(x, low, high, norm, level, k, size))
+                _turn(own, z[j], x, low, high, level, j, span)
+        rest, terms = _stationarity(A, C, own, span, n, force, k == p)
+        slack, value, slope, total = _value(own, x, low, high, level, b, k, span)
+        if k == p:
+            terms = max(terms, _COARSE * pull)
+        elif fits[k] != SCALED:
+            terms = max(terms, _COARSE * _weight(x, low, high, span, level, k, size))
         residuals[k, DUAL] = rest / terms if terms > 0.0 else 0.0
         residuals[k, PRIMAL] = 0.0  # a fitted or skipped level promises nothing of its own rows
         if k == p or (fits[k] == SCALED and scales[k] == scales[k]):
-            residuals[k, PRIMAL] = _primal(x, low, high, norm, level, k, p, size)
+            residuals[k, PRIMAL] = _primal(x, low, high, span, level, given, k, p, size)
         residuals[k, GAP] = 0.0
         if k == p or fits[k] != SCALED:
             residuals[k, GAP] = slack / (terms * size) if terms * size > 0.0 else 0.0
         elif scales[k] != scales[k]:
             at_zero = value - slope
             margin = min(value, at_zero)
-            residuals[k, GAP] = 0.0 if margin > 0.0 else 1.0 - margin
+            residuals[k, GAP] = 0.0 if margin > _CLEAR * total else 1.0
         elif scales[k] < 1.0:
             residuals[k, GAP] = abs(value) / slope if slope > 0.0 else np.inf
 
@@ -90,27 +107,28 @@ def _rows(
     d: FloatArray,
     sizes: NDArray[np.int64],
     fits: NDArray[np.int64],
+    natural: FloatArray,
     lower: FloatArray,
     upper: FloatArray,
     C: FloatArray,
     c_lower: FloatArray,
     c_upper: FloatArray,
     u: FloatArray,
+    size: float,
     scales: FloatArray,
     x: FloatArray,
     low: FloatArray,
     high: FloatArray,
-    norm: FloatArray,
+    span: FloatArray,
     level: NDArray[np.int64],
 ) -> float:
-    """Value, interval, norm and level of every row (-1: hard); the size of u that residuals are relative to.
+    """Value, interval, span and level of every row (-1: hard); the size of u, at least the given one.
 
-    A skipped level asks for what it asks at s = 1.
+    A skipped level asks for what it asks at s = 1. The span of a row is its norm, of an equation the largest of its
+    task: a row that is nothing beside the others is zero.
     """
     n, M, r, p = u.shape[0], A.shape[0], C.shape[0], sizes.shape[0]
-    size = 0.0
     for i in range(n):
-        size = max(size, abs(u[i]))
         x[M + i], level[M + i] = u[i], -1
         low[M + i] = lower[i] if lower.shape[0] > 0 else -np.inf
         high[M + i] = upper[i] if upper.shape[0] > 0 else np.inf
@@ -121,13 +139,13 @@ def _rows(
             t += entry * u[k]
             length += entry * entry
         at = i if i < M else i + n
-        x[at], norm[at], level[at] = t, np.sqrt(length), -1
+        x[at], span[at], level[at] = t, np.sqrt(length), -1
         if i >= M:
             low[at], high[at] = c_lower[i - M], c_upper[i - M]
-    soft = r
+    rest = 0
     for k in range(p):
-        soft -= sizes[k] if fits[k] == INTERVAL else 0
-    row, soft = 0, M + n + soft
+        rest += sizes[k] if fits[k] == INTERVAL else 0
+    row, soft = 0, M + n + r - rest
     for k in range(p):
         if fits[k] == INTERVAL:
             for i in range(soft, soft + sizes[k]):
@@ -135,13 +153,21 @@ def _rows(
             soft += sizes[k]
             continue
         s = 1.0 if fits[k] == FITTED or scales[k] != scales[k] else scales[k]
+        widest, command = natural[k], 0.0
         for i in range(row, row + sizes[k]):
             level[i] = k
             low[i] = s * b[i] - (d[i] if d.shape[0] > 0 else 0.0)
             high[i] = low[i]
-            if norm[i] > 0.0:
-                size = max(size, 1e-2 * abs(b[i]) / norm[i])
+            widest, command = max(widest, span[i]), max(command, abs(b[i]))
+        for i in range(row, row + sizes[k]):
+            span[i] = widest
+        if widest > 0.0:
+            size = max(size, 1e-2 * command / widest)
         row += sizes[k]
+    for i in range(M + n + r - rest, M + n + r):
+        miss = _MISSED * (span[i] * size + abs(x[i]))
+        if low[i] - miss <= x[i] <= high[i] + miss:
+            low[i], high[i] = min(low[i], x[i]), max(high[i], x[i])
     return size
 
 
@@ -160,11 +186,15 @@ def _turn(
     high: FloatArray,
     level: NDArray[np.int64],
     j: int,
+    span: FloatArray,
 ) -> None:
     """Add so much of what cancels at level j that the inequalities in it have the sign of the bound they are at."""
     share = 0.0
+    most, most_earlier = _largest(own, span), _largest(earlier, span)
     for i in range(x.shape[0]):
-        if earlier[i] == 0.0 or own[i] == 0.0 or _equality(level[i], j, x[i], low[i], high[i]):
+        if abs(earlier[i]) * span[i] <= _NOISE * most_earlier or abs(own[i]) * span[i] <= _NOISE * most:
+            continue
+        if _equality(level[i], j, x[i], low[i], high[i]):
             continue
         sign = 1.0 if x[i] - low[i] < high[i] - x[i] else -1.0
         if sign * own[i] < 0.0 and sign * earlier[i] > 0.0:
@@ -175,8 +205,17 @@ def _turn(
 
 
 @part
+def _largest(z: FloatArray, span: FloatArray) -> float:
+    """The largest term of a sum."""
+    largest = 0.0
+    for i in range(z.shape[0]):
+        largest = max(largest, abs(z[i]) * span[i])
+    return largest
+
+
+@part
 def _stationarity(
-    A: FloatArray, C: FloatArray, own: FloatArray, norm: FloatArray, n: int, force: FloatArray, last: bool
+    A: FloatArray, C: FloatArray, own: FloatArray, span: FloatArray, n: int, force: FloatArray, last: bool
 ) -> tuple[float, float]:
     """What does not cancel, and the size of the terms."""
     M = A.shape[0]
@@ -191,23 +230,21 @@ def _stationarity(
             t -= force[k]
             terms = max(terms, abs(force[k]))
         rest = max(rest, abs(t))
-    for i in range(own.shape[0]):
-        terms = max(terms, abs(own[i]) * norm[i])
-    return rest, terms
+    return rest, max(terms, _largest(own, span))
 
 
 @part
 def _weight(
-    x: FloatArray, low: FloatArray, high: FloatArray, norm: FloatArray, level: NDArray[np.int64], k: int, size: float
+    x: FloatArray, low: FloatArray, high: FloatArray, span: FloatArray, level: NDArray[np.int64], k: int, size: float
 ) -> float:
     """The size of the gradient's terms if a level's rows were missed by all they are."""
     largest = 0.0
     for i in range(x.shape[0]):
         if level[i] == k:
-            largest = max(largest, norm[i] * max(abs(x[i]), norm[i] * size))
+            largest = max(largest, span[i] * max(abs(x[i]), span[i] * size))
             for side in (low[i], high[i]):
                 if abs(side) < np.inf:
-                    largest = max(largest, norm[i] * abs(side))
+                    largest = max(largest, span[i] * abs(side))
     return largest
 
 
@@ -220,30 +257,34 @@ def _value(
     level: NDArray[np.int64],
     b: FloatArray,
     k: int,
-    norm: FloatArray,
-) -> tuple[float, float, float]:
-    """Complementarity ``sum |z_i| slack_i``, h at the present scale (1 if skipped) and its slope."""
-    slack, value, slope = 0.0, 0.0, 0.0
+    span: FloatArray,
+) -> tuple[float, float, float, float]:
+    """Complementarity ``sum |z_i| slack_i``, h at the present scale (1 if skipped), its slope and terms."""
+    slack, value, slope, total, most = 0.0, 0.0, 0.0, 0.0, _largest(own, span)
     for i in range(x.shape[0]):
         if own[i] == 0.0:
             continue
         if level[i] == k and i < b.shape[0]:
             slope += own[i] * b[i]
             value += own[i] * low[i]
+            total += abs(own[i]) * max(abs(b[i]), abs(low[i]))
             continue
         if _equality(level[i], k, x[i], low[i], high[i]):
-            value += own[i] * (low[i] if level[i] < 0 else x[i])
+            side = low[i] if level[i] < 0 else x[i]
+            value += own[i] * side
+            total += abs(own[i] * side)
             continue
         if level[i] == k:
             continue
         bound = low[i] if own[i] > 0.0 else high[i]
         if abs(bound) == np.inf:
-            if abs(own[i]) * norm[i] > 1e-12:
-                slack, value = np.inf, np.inf
+            if abs(own[i]) * span[i] > _NOISE * most:
+                slack, value = np.inf, -np.inf
             continue
         slack += abs(own[i] * (x[i] - bound))
         value += own[i] * bound
-    return slack, value, slope
+        total += abs(own[i] * bound)
+    return slack, value, slope, total
 
 
 @part
@@ -251,8 +292,9 @@ def _primal(
     x: FloatArray,
     low: FloatArray,
     high: FloatArray,
-    norm: FloatArray,
+    span: FloatArray,
     level: NDArray[np.int64],
+    given: FloatArray,
     k: int,
     p: int,
     size: float,
@@ -263,7 +305,6 @@ def _primal(
     for i in range(x.shape[0]):
         if level[i] == wanted:
             miss = max(max(low[i] - x[i], x[i] - high[i]), 0.0)
-            unit = norm[i] * size + abs(x[i])
             if miss > 0.0:
-                worst = max(worst, miss / unit)
+                worst = max(worst, miss / (span[i] * size + abs(x[i]) + given[i]))
     return worst

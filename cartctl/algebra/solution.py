@@ -147,12 +147,16 @@ class Solution:
 
     @property
     def status(self) -> Status:
-        """How it went; by the residuals alone where the solver does not say."""
+        """How it went: RECOVERING where joints are being brought back, else the outcome."""
+        outcome = self.outcome
+        return Status.RECOVERING if self.recovering and outcome is not Status.FAILED else outcome
+
+    @property
+    def outcome(self) -> Status:
+        """How the problem was solved; by the residuals alone where the solver does not say."""
         if self._status is None:
             by_residuals = Status.OPTIMAL if self.met else Status.INEXACT
             self._status = by_residuals if self._method is None else self._method.grade(self)
-        if self.recovering and self._status is not Status.FAILED:
-            return Status.RECOVERING
         return self._status
 
     @property

@@ -9,13 +9,13 @@ from numpy.typing import NDArray
 
 from cartctl.checks import FloatArray
 from cartctl.kernels import part
-from cartctl.solvers.exact.descent import SETTLED, load, settle
+from cartctl.solvers.exact.descent import SETTLED, STALLED, load, settle
 from cartctl.solvers.exact.fitted import fitted_level
 from cartctl.solvers.exact.inequalities import EQUAL, OUT, SILENT, Inequalities, drop_all_free, normal_of
-from cartctl.solvers.exact.kinds import FITTED, INTERVAL, LOST_RANK, RELAXED, SCALED, STUCK
+from cartctl.solvers.exact.kinds import CONTRADICTORY, FITTED, INTERVAL, LOST_RANK, SCALED, STUCK
 from cartctl.solvers.exact.proof import write_multipliers
 from cartctl.solvers.exact.rows import Equations, fix_rows, task_size
-from cartctl.solvers.exact.scaled import MET, scaled_level
+from cartctl.solvers.exact.scaled import MET, SKIPPED, scaled_level
 from cartctl.solvers.exact.working_set import (
     FIXED,
     FREE,
@@ -32,7 +32,6 @@ from cartctl.solvers.exact.working_set import (
 )
 
 _MISSED = 1e-9  # relative: a row of an interval level that is missed by less is met
-_SLACK = 1e-11  # relative: what a relaxed row is given beyond what it needs
 
 
 @part
@@ -50,7 +49,10 @@ def by_levels(
     proofs: FloatArray,
     most: int,
 ) -> int:
-    """Fill u, scales and proofs; flags. The first ``members`` rows may be in the set already."""
+    """Fill u, scales and proofs; flags. The first ``members`` rows may be in the set already.
+
+    CONTRADICTORY, and nothing else, where hard rows and box exclude each other.
+    """
     n, p = u.shape[0], sizes.shape[0]
     saved, states = new_working_set(n), np.empty(q.state.shape[0], np.int64)
     flags = 0
@@ -85,7 +87,7 @@ def by_levels(
             settled = False
             code = settle(w, q, u, 1.0, most)
             if code != SETTLED:
-                outcome, lost = code, False
+                outcome, lost = (SKIPPED if code >= 0 else STALLED), False
             elif fits[k] == FITTED:
                 size = task_size(e, first, last, natural[k])
                 target = e.base[first:last]
@@ -99,21 +101,15 @@ def by_levels(
                     _press(w, q)
                     _settle_interval(w, q, first, last, u)
         members = 0
-        if lost and fits[k] == SCALED:
+        if lost:
             flags |= LOST_RANK
         if outcome != MET:
             copy_members(saved, w)
             for i in range(q.state.shape[0]):
                 q.state[i] = states[i]
-            if not feasible:  # the rows may contradict the box: then they yield, and this level has another try
-                feasible = True
-                if settle(w, q, u, 1.0, most) != SETTLED:
-                    drop_all_free(q, w)
-                    flags |= RELAXED
-                    _relax(w, q, hard, e.norm, u, most)
-                    if proof.shape[0] > 0:
-                        proof[:] = 0.0
-                    continue
+            if not feasible and settle(w, q, u, 1.0, most) != SETTLED:
+                return CONTRADICTORY
+            feasible = True
             scales[k] = math.nan
             if outcome < 0:
                 flags |= STUCK
@@ -124,10 +120,7 @@ def by_levels(
         load(w, q, start, 1.0)
         code = settle(w, q, u, 1.0, most)
         if code != SETTLED and not feasible:
-            drop_all_free(q, w)
-            flags |= RELAXED
-            _relax(w, q, hard, e.norm, u, most)
-            code = settle(w, q, u, 1.0, most)
+            return CONTRADICTORY
         if code != SETTLED:
             flags |= STUCK
     if proofs.shape[1] > 0:
@@ -197,11 +190,14 @@ def _keep_interval(
 @part
 def _settle_interval(w: WorkingSet, q: Inequalities, first: int, last: int, u: FloatArray) -> None:
     """Rows that are met go on as inequalities, rows that are missed as equalities."""
-    n = u.shape[0]
+    n, reach = u.shape[0], q.norm[q.state.shape[0]]
+    for k in range(n):
+        reach = max(reach, abs(u[k]))
     for r in range(first, last):
         x, miss = _miss(q, r, u)
-        if abs(miss) <= _MISSED * max(abs(x), q.norm[n + r] * q.norm[q.state.shape[0]]):
-            q.state[n + r] = OUT
+        if abs(miss) <= _MISSED * q.norm[n + r] * reach:
+            q.state[n + r] = OUT  # and as wide as it is met, or the levels below would find it contradictory
+            q.B[0, n + r], q.B[1, n + r] = min(q.B[0, n + r], x), max(q.B[1, n + r], x)
             continue
         left = normal_of(q, 2 * (n + r), w)
         if w.K[NUM, 0] < n and left > _MISSED:
@@ -216,20 +212,3 @@ def _miss(q: Inequalities, r: int, u: FloatArray) -> tuple[float, float]:
     for k in range(n):
         x += q.C[r, k] * u[k]
     return x, min(x - q.B[0, n + r], 0.0) + max(x - q.B[1, n + r], 0.0)
-
-
-@part
-def _relax(w: WorkingSet, q: Inequalities, hard: int, norm: FloatArray, u: FloatArray, most: int) -> None:
-    """Widen the hard rows to the least-squares miss that the box allows."""
-    n = u.shape[0]
-    for r in range(hard):
-        q.state[n + r] = SILENT
-    settle(w, q, u, 1.0, most)
-    _keep_interval(w, q, hard - hard, hard, norm, np.empty(0), u, most)
-    drop_all_free(q, w)
-    for r in range(hard):
-        x, _ = _miss(q, r, u)
-        slack = _SLACK * max(abs(x), q.norm[n + r] * max(q.norm[q.state.shape[0]], 1e-3))
-        q.B[0, n + r] = min(q.B[0, n + r], x - slack)
-        q.B[1, n + r] = max(q.B[1, n + r], x + slack)
-        q.state[n + r] = OUT

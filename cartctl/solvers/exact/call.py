@@ -16,10 +16,10 @@ from cartctl.algebra.certificate import Certificate, LevelCertificate
 from cartctl.algebra.metric import Whitening
 from cartctl.algebra.problem import Problem
 from cartctl.algebra.proofs import check_proofs
-from cartctl.algebra.solution import Solution
+from cartctl.algebra.solution import Solution, Status
 from cartctl.algebra.svd import scale
 from cartctl.checks import FloatArray
-from cartctl.solvers.exact.kinds import FITTED, INTERVAL, SCALED
+from cartctl.solvers.exact.kinds import CONTRADICTORY, FITTED, INTERVAL, SCALED
 from cartctl.solvers.exact.lexicographic import lexicographic
 
 _KINDS = {"scale": SCALED, "least_squares": FITTED, "inequality": INTERVAL}
@@ -60,15 +60,34 @@ def answer(problem: Problem, fitted: bool, start: Solution | None) -> Outcome:
     """The exact answer; fitted: every equation by least squares, whatever its fit says. Raises FloatingPointError."""
     guess = _NO_GUESS if start is None or start.warm is None else start.warm
     if problem.metric is None:
-        return _run(arrays_of(problem, fitted), problem.n, guess, _NO_ROWS)
+        return _yielding(arrays_of(problem, fitted), problem, guess)
     white = Whitening(problem.metric)
-    found = _run(whitened(arrays_of(problem, fitted), problem, white), problem.n, guess, _NO_ROWS)
+    found = _yielding(whitened(arrays_of(problem, fitted), problem, white), problem, guess)
     u = white.back(found.u)
     if problem.lower is not None:
         u = np.maximum(u, problem.lower)
     if problem.upper is not None:
         u = np.minimum(u, problem.upper)
     return found._replace(u=u)
+
+
+def _yielding(arrays: Arrays, problem: Problem, guess: NDArray[np.int64]) -> Outcome:
+    """The answer; where the box forbids the constraint rows, they are missed by as little as it allows."""
+    found = _run(arrays, problem.n, guess, _NO_ROWS)
+    if not found.flags & CONTRADICTORY:
+        return found
+    found = _run(_demoted(arrays, problem), problem.n, _NO_GUESS, _NO_ROWS)
+    return found._replace(scales=found.scales[1:], flags=found.flags | CONTRADICTORY)
+
+
+def _demoted(arrays: Arrays, problem: Problem) -> Arrays:
+    """The constraint rows as a level of their own, above all others."""
+    assert problem.constraints is not None
+    return arrays._replace(
+        sizes=np.append(problem.constraints[0].shape[0], arrays.sizes),
+        fits=np.append(INTERVAL, arrays.fits),
+        natural=np.append(0.0, arrays.natural),
+    )
 
 
 def _run(arrays: Arrays, n: int, guess: NDArray[np.int64], proofs: FloatArray) -> Outcome:
@@ -167,55 +186,42 @@ def whitened(arrays: Arrays, problem: Problem, white: Whitening) -> Arrays:
 def certificate(solution: Solution, fitted: bool) -> Certificate:
     """Solve once more, asking for multipliers, and check them against the solution itself."""
     problem = solution.problem
-    n, p = problem.n, len(problem.equations)
-    given = arrays_of(problem, fitted)
-    M, r = given.A.shape[0], given.C.shape[0]
-    if problem.metric is None:
-        proofs = np.zeros((p + 1, M + n + r))
-        _run(given, n, _NO_GUESS, proofs)
-    else:
-        proofs = _proofs_in_metric(given, problem, p)
-    step = solution.u if problem.reference is None else solution.u - problem.reference
-    W = problem.metric
-    force = step if W is None else W * step if W.ndim == 1 else W @ step
+    given, scales = arrays_of(problem, fitted), solution.scales
+    names = [e.name for e in problem.equations]
+    arrays = given if problem.metric is None else whitened(given, problem, Whitening(problem.metric))
+    if solution.outcome is Status.INFEASIBLE:
+        arrays = _demoted(arrays, problem)
+        given, scales, names = _demoted(given, problem), np.append(1.0, scales), ["constraints", *names]
+    p, M, r = len(names), given.A.shape[0], given.C.shape[0]
+    proofs = _proofs(arrays, problem, np.zeros((p + 1, M + problem.n + r)))
+    u, u0, W = solution.u, problem.reference, problem.metric
+    force = _weighed(W, u if u0 is None else u - u0)
+    sizes = np.abs(u) if u0 is None else np.abs(u) + np.abs(u0)
+    pull, reach = float(_weighed(None if W is None else np.abs(W), sizes).max()), float(sizes.max())
     residuals = np.zeros((p + 1, 3))
-    arguments = (given.A, given.b, given.d, given.sizes, given.fits, given.lower, given.upper)
-    C, c_lower, c_upper = _widened(given, solution.u)
-    check_proofs.compiled(*arguments, C, c_lower, c_upper, force, solution.u, solution.scales, proofs, residuals)
-    levels = []
-    for k in range(p + 1):
-        name = getattr(problem.equations[k], "name", "") if k < p else "reference"
-        claim = _CLAIMS[int(given.fits[k])] if k < p else "nearest"
-        if k < p and np.isnan(solution.scales[k]):
-            claim = "skipped"
-        primal, dual, gap = residuals[k].tolist()
-        levels.append(LevelCertificate(name, claim, primal, dual, gap, proofs[k]))
-    return Certificate(tuple(levels))
+    arguments = (given.A, given.b, given.d, given.sizes, given.fits, given.natural, given.lower, given.upper)
+    rows = (given.C, given.c_lower, given.c_upper)
+    check_proofs.compiled(*arguments, *rows, force, pull, reach, u, scales, proofs, residuals)
+    claims = ["skipped" if s != s else _CLAIMS[int(kind)] for s, kind in zip(scales, given.fits, strict=True)]
+    levels = zip([*names, "reference"], [*claims, "nearest"], residuals.tolist(), proofs, strict=True)
+    return Certificate(
+        tuple(LevelCertificate(name, claim, three[0], three[1], three[2], z) for name, claim, three, z in levels)
+    )
 
 
-def _proofs_in_metric(given: Arrays, problem: Problem, p: int) -> FloatArray:
-    """Multipliers of the whitened problem, as those of the rows and bounds they stand for."""
-    n, M, r = problem.n, given.A.shape[0], given.C.shape[0]
-    assert problem.metric is not None
-    arrays = whitened(given, problem, Whitening(problem.metric))
-    if problem.metric.ndim == 1:
-        proofs = np.zeros((p + 1, M + n + r))
-        _run(arrays, n, _NO_GUESS, proofs)
-        proofs[:, M : M + n] *= np.sqrt(problem.metric)
-        return proofs
-    proofs = np.zeros((p + 1, M + n + n + r))  # the box is n rows
+def _weighed(W: FloatArray | None, u: FloatArray) -> FloatArray:
+    """``W u``."""
+    return u if W is None else W * u if W.ndim == 1 else W @ u
+
+
+def _proofs(arrays: Arrays, problem: Problem, proofs: FloatArray) -> FloatArray:
+    """Multipliers of every level, (p + 1, M + n + r), for the problem's own rows and bounds."""
+    n, M, W = problem.n, arrays.A.shape[0], problem.metric
+    if W is not None and W.ndim == 2:
+        longer = np.zeros((proofs.shape[0], proofs.shape[1] + n))  # the box is n rows
+        _run(arrays, n, _NO_GUESS, longer)
+        return np.delete(longer, np.s_[M : M + n], axis=1)
     _run(arrays, n, _NO_GUESS, proofs)
-    return np.delete(proofs, np.s_[M : M + n], axis=1)
-
-
-def _widened(given: Arrays, u: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """The hard rows, as far as they had to yield to the box."""
-    if given.C.shape[0] == 0:
-        return given.C, given.c_lower, given.c_upper
-    hard = given.C.shape[0] - int(given.sizes[given.fits == INTERVAL].sum())
-    x = given.C @ u
-    yields = np.arange(given.C.shape[0]) < hard
-    slack = 1e-9 * (np.abs(given.C) @ np.abs(u))
-    c_lower = np.where(yields & (x < given.c_lower - slack), x, given.c_lower)
-    c_upper = np.where(yields & (x > given.c_upper + slack), x, given.c_upper)
-    return given.C, c_lower, c_upper
+    if W is not None:
+        proofs[:, M : M + n] *= np.sqrt(W)
+    return proofs

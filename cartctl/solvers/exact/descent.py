@@ -14,6 +14,7 @@ from cartctl.checks import FloatArray
 from cartctl.kernels import part
 from cartctl.solvers.exact.inequalities import (
     OUT,
+    TOUCHED,
     Inequalities,
     drop,
     most_violated,
@@ -22,6 +23,8 @@ from cartctl.solvers.exact.inequalities import (
     take_in,
 )
 from cartctl.solvers.exact.working_set import (
+    C0,
+    C1,
     FIXED,
     FREE,
     KIND,
@@ -43,6 +46,8 @@ DEPENDENT = 1e-11  # of a unit normal: what is left of it is round-off
 _SURELY = 30.0  # times what round-off may leave
 SMALL = 1e-11  # of the largest coefficient of a combination
 _CLEARLY = 1e-6  # of a unit normal: a guess that adds less is left out
+_SUMMED = 1e-12  # of the terms of a sum: round-off
+_TOUCHED = 1e-9  # of the size of u: and in no case more than this
 _LEAST = 1e-3  # coefficients below this are not what others are compared with
 
 
@@ -125,6 +130,21 @@ def _first_in_the_way(w: WorkingSet, floor: float) -> tuple[int, float]:
 
 
 @part
+def _touches(w: WorkingSet, side: float, u: FloatArray, s: float) -> bool:
+    """Whether the newcomer, a combination of the members, contradicts them by no more than round-off in their sum."""
+    missing, total, size = side, 0.0, abs(side)
+    settled = True  # by levels above alone: it was met there, before their members were exchanged
+    for k in range(u.shape[0]):
+        size = max(size, abs(u[k]))
+    for j in range(w.K[NUM, 0]):
+        missing -= w.V[SUM, j] * (w.V[C0, j] + s * w.V[C1, j])
+        total += abs(w.V[SUM, j]) * max(abs(w.V[C0, j]), abs(s * w.V[C1, j]), size)
+        if (w.K[KIND, j] != FIXED or w.V[C1, j] != 0.0) and abs(w.V[SUM, j]) > DEPENDENT:
+            settled = False
+    return missing <= (_TOUCHED * size if settled else min(_SUMMED * total, _TOUCHED * size))
+
+
+@part
 def _bring_in(w: WorkingSet, q: Inequalities, code: int, u: FloatArray, s: float, most: int) -> int:
     """Make the violated inequality a member, dropping those in its way."""
     side = right_side(q, code)
@@ -138,6 +158,9 @@ def _bring_in(w: WorkingSet, q: Inequalities, code: int, u: FloatArray, s: float
         dependent = w.K[NUM, 0] >= n or left < independence(w)
         if dependent:
             if blocking < 0:
+                if _touches(w, side, u, s):
+                    q.state[code >> 1] = TOUCHED
+                    return SETTLED
                 return code
         else:
             missing = side

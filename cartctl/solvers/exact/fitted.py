@@ -24,7 +24,8 @@ from cartctl.solvers.exact.working_set import LAM, NUM, H, WorkingSet, Z, combin
 
 _NOISE = 2e-8  # of the rows' size: singular values below this lead nowhere
 _REST = 1e-11  # of the largest miss: a step that changes the rows by less is none
-_ROUND_OFF = 1e-14  # of what is added up in a row: a miss below this is none
+_ROUND_OFF = 1e-14  # of the rows' size times that of u: rows that move or miss by less do not
+_NOTHING = 1e-12  # of what is added up in a row, or may have been: a miss below this is none
 _PULLS = 1e-10  # of the rows' size times the largest miss: a multiplier below this is none
 
 
@@ -51,9 +52,10 @@ def fitted_level(
         count = misses(rows, low, high, u, size, miss)
         rank = _step(w, rows, miss, count, size, p)
         if turn == 0:
-            lost = rank < min(m, n)
-        largest = _largest(rows, low, high, u, size, miss)
-        if _moves(rows, p, largest, _ROUND_OFF * size * _length(u)):
+            lost = rank < min(m, n - w.K[NUM, 0])
+        largest = _largest(rows, u, float(q.norm[q.state.shape[0]]), miss)
+        round_off = _ROUND_OFF * size * _length(u)
+        if _moves(rows, p, largest, round_off):
             most_far, code = blocked_at(q, w, u, p)
             far = lowest_at(rows, low, high, u, p, most_far)
             for k in range(n):
@@ -63,7 +65,7 @@ def fitted_level(
                 take_in(q, w, code, left, 0.0)
             continue
         _slope(rows, miss, gradient)
-        weakest = _multipliers(w, gradient, _PULLS * size * largest)
+        weakest = _multipliers(w, gradient, size * max(_PULLS * largest, round_off))
         if weakest < 0:
             write_multipliers(w, q, norm, proof)
             return MET, lost
@@ -79,10 +81,7 @@ def misses(rows: FloatArray, low: FloatArray, high: FloatArray, u: FloatArray, s
         x = 0.0
         for k in range(rows.shape[1]):
             x += rows[i, k] * u[k]
-        if low[i] == high[i]:
-            miss[i] = low[i] - x
-            count += 1
-        elif x < low[i]:
+        if low[i] == high[i] or x < low[i]:
             miss[i] = low[i] - x
             count += 1
         elif x > high[i]:
@@ -133,16 +132,15 @@ def _step(w: WorkingSet, rows: FloatArray, miss: FloatArray, count: int, size: f
 
 
 @part
-def _largest(
-    rows: FloatArray, low: FloatArray, high: FloatArray, u: FloatArray, size: float, miss: FloatArray
-) -> float:
-    """The largest miss; round-off is set to zero."""
-    largest = 0.0
+def _largest(rows: FloatArray, u: FloatArray, unit: float, miss: FloatArray) -> float:
+    """The largest miss; those that are nothing are set to zero."""
+    largest, reach = 0.0, max(unit, _length(u))
     for i in range(rows.shape[0]):
-        total = 0.0
+        total, length = 0.0, 0.0
         for k in range(rows.shape[1]):
             total += abs(rows[i, k] * u[k])
-        if abs(miss[i]) <= 10.0 * _ROUND_OFF * (total + abs(miss[i] + total)):
+            length = max(length, abs(rows[i, k]))
+        if abs(miss[i]) <= _NOTHING * (total + length * reach):
             miss[i] = 0.0
         largest = max(largest, abs(miss[i]))
     return largest

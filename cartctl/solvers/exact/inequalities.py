@@ -16,7 +16,8 @@ from cartctl.checks import FloatArray
 from cartctl.kernels import part
 from cartctl.solvers.exact.working_set import FIXED, FREE, KIND, NUM, WHO, WorkingSet, Z, append, orthogonalise, remove
 
-OUT, MEMBER, IMPLIED, EQUAL, SILENT = 0, 1, 2, 3, 4  # not in the set; in it; met with it; an equality; not yet in force
+# Not in the set; in it; met with it; an equality; not yet in force; met with it up to round-off.
+OUT, MEMBER, IMPLIED, EQUAL, SILENT, TOUCHED = 0, 1, 2, 3, 4, 5
 
 _MET = 1e-12  # relative: an inequality missed by less is met
 
@@ -97,9 +98,18 @@ def drop(q: Inequalities, w: WorkingSet, j: int) -> None:
 @part
 def drop_all_free(q: Inequalities, w: WorkingSet) -> None:
     """Take out every member that is not an equality."""
+    forget_touched(q)
     for j in range(w.K[NUM, 0] - 1, -1, -1):
         if w.K[KIND, j] != FIXED:
             drop(q, w, j)
+
+
+@part
+def forget_touched(q: Inequalities) -> None:
+    """The members have changed: what was met with the former ones is looked at again."""
+    for i in range(q.state.shape[0]):
+        if q.state[i] == TOUCHED:
+            q.state[i] = OUT
 
 
 @part

@@ -21,6 +21,7 @@ from cartctl.solvers.exact.working_set import (
     Y,
     Z,
     append,
+    append_at,
     combine,
     orthogonalise,
     refill,
@@ -28,6 +29,7 @@ from cartctl.solvers.exact.working_set import (
 
 END = 1e-9  # s this far outside [0, 1] is round-off
 _DEPENDENT = 2e-8  # of the task's own size: what is left of a row is noise
+_ROUND_OFF = 1e-12  # of s, or of the size of u
 _SAME = 1e-8  # relative: sides that differ by less agree
 
 
@@ -56,13 +58,11 @@ def fix_rows(w: WorkingSet, e: Equations, first: int, last: int, size: float, u:
         norm = e.norm[i]
         if norm <= _DEPENDENT * size or w.K[NUM, 0] >= u.shape[0]:
             continue
-        x = 0.0
         for k in range(u.shape[0]):
             w.V[Z, k] = e.A[i, k] / norm
-            x += w.V[Z, k] * u[k]
         left = orthogonalise(w, 1.0)
         if left * norm > _DEPENDENT * size:
-            append(w, -1 - i, left, x, 0.0, 0.0)
+            append_at(w, -1 - i, left, u)
 
 
 @part
@@ -90,7 +90,8 @@ def add_rows(
                 continue
             combine(w, w.V[H], w.V[SUM])
         else:
-            norm = max(size, norm) if size > 0.0 else 1.0
+            norm = size if size > 0.0 else 1.0
+            e.norm[i] = norm  # a row of zeros is as large as its task
             for j in range(w.K[NUM, 0]):
                 w.V[SUM, j] = 0.0
         lost = True
@@ -102,16 +103,20 @@ def add_rows(
             at_size = max(at_size, abs(w.V[SUM, j] * w.V[C0, j]), abs(w.V[G, j]))
             bt_size = max(bt_size, abs(w.V[SUM, j] * w.V[C1, j]))
         if abs(bt) <= _SAME * bt_size:
-            if abs(at) <= _SAME * max(at_size, bt_size):
+            if abs(at) <= max(_SAME * max(at_size, bt_size), _ROUND_OFF * q.norm[q.state.shape[0]]):
                 continue
             _prove_row(w, q, e, i, pin, at, bt, proof)
             return False, math.nan, pin, lost
-        pinned = 0.0 if abs(at) <= _SAME * at_size else at / bt
+        pinned = at / bt
+        if pinned < 0.0 and abs(at) <= _SAME * at_size:
+            pinned = 0.0
+        elif pinned > 1.0 and abs(at - bt) <= _SAME * max(at_size, bt_size):
+            pinned = 1.0
         if pinned < -END or pinned > 1.0 + END or (pin != NOBODY and abs(pinned - s) > _SAME):
             _prove_row(w, q, e, i, pin, at, bt, proof)
             return False, math.nan, pin, lost
         if pin == NOBODY:
-            pin, s = -1 - i, min(1.0, max(0.0, pinned))
+            pin, s = -1 - i, max(0.0, pinned) if pinned < 1.0 - _ROUND_OFF else 1.0
             for j in range(w.K[NUM, 0]):
                 w.V[Y, j] = -w.V[SUM, j]
             refill(w, s)

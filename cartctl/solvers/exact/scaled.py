@@ -17,7 +17,17 @@ from numpy.typing import NDArray
 from cartctl.checks import FloatArray
 from cartctl.kernels import part
 from cartctl.solvers.exact.descent import SMALL, STALLED, independence, largest_coefficient, load, settle
-from cartctl.solvers.exact.inequalities import EQUAL, IMPLIED, OUT, Inequalities, drop, normal_of, right_side, take_in
+from cartctl.solvers.exact.inequalities import (
+    EQUAL,
+    IMPLIED,
+    OUT,
+    Inequalities,
+    drop,
+    forget_touched,
+    normal_of,
+    right_side,
+    take_in,
+)
 from cartctl.solvers.exact.proof import NOBODY, write_proof
 from cartctl.solvers.exact.rows import END, Equations, add_rows, rise
 from cartctl.solvers.exact.working_set import (
@@ -131,6 +141,7 @@ def _cut(
         return False, s, code
     s = max(min(s, -constant / slope), 0.0)
     q.state[code >> 1] = IMPLIED
+    forget_touched(q)
     refill(w, s)
     return True, s, code
 

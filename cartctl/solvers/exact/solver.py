@@ -13,7 +13,7 @@ from cartctl.algebra.solution import Solution, Status
 from cartctl.checks import FloatArray
 from cartctl.solvers.base import Solver
 from cartctl.solvers.exact.call import answer, certificate
-from cartctl.solvers.exact.kinds import LOST_RANK, RELAXED, STUCK
+from cartctl.solvers.exact.kinds import CONTRADICTORY, LOST_RANK, STUCK
 from cartctl.solvers.exact.lexicographic import lexicographic
 
 
@@ -39,8 +39,8 @@ class ExactSolver(Solver):
             found = answer(problem, self.fits_all, start)
         except FloatingPointError:
             return self._failed(problem)
-        status = Status.INFEASIBLE if found.flags & RELAXED else None
-        if found.flags & STUCK and not found.flags & RELAXED:
+        status = Status.INFEASIBLE if found.flags & CONTRADICTORY else None
+        if found.flags & STUCK:
             status = Status.FAILED
         lost = bool(found.flags & LOST_RANK)
         solution = Solution(problem, found.u, self.name, self, status, lost, found.scales)
@@ -60,15 +60,17 @@ class ExactSolver(Solver):
         return Solution(problem, u, self.name, status=Status.FAILED)
 
     def grade(self, solution: Solution) -> Status:
-        """By the scales, then by rank and by what is asked for exactly."""
+        """By what is skipped, by rank, by the scales, by what is asked for exactly."""
         scales = solution.scales
         if np.isnan(scales).any():
             return Status.SKIPPED
+        if solution.lost_rank:
+            return Status.SINGULAR
         if scales.min(initial=1.0) < 1.0:
             return Status.SCALED
         if not solution.holds(("scale", "inequality")):
             return Status.INEXACT
-        return Status.SINGULAR if solution.lost_rank else Status.OPTIMAL
+        return Status.OPTIMAL
 
     def task_part(self, solution: Solution) -> FloatArray:
         """What of an answer the tasks ask for, (n,): the answer with u0 = 0."""

@@ -101,6 +101,23 @@ def append(w: WorkingSet, who: int, left: float, c0: float, c1: float, s: float)
 
 
 @part
+def append_at(w: WorkingSet, who: int, left: float, u: FloatArray) -> None:
+    """Add the equality that the same normal has at u, which is on the members.
+
+    Straight from u: what little is left of a nearly dependent normal would magnify the round-off in ``n . u``.
+    """
+    h, z, q = w.V[H], w.V[Z], w.K[NUM, 0]
+    along = 0.0
+    for k in range(u.shape[0]):
+        along += z[k] * u[k]
+    c0 = along
+    for i in range(q):
+        c0 += h[i] * w.V[G, i]
+    append(w, who, left, c0, 0.0, 0.0)
+    w.V[G, q] = along / left
+
+
+@part
 def noise(w: WorkingSet) -> float:
     """What round-off may leave of the normal whose components are h, if it depends on the members.
 

@@ -1,0 +1,131 @@
+"""Random problems and random closed-loop steps on all cores, every answer checked by its certificate.
+
+    make soak MINUTES=10
+    python benchmarks/soak.py --minutes 10 --share 0.5      # of the time, the problems' part
+    python benchmarks/soak.py --problem SEED INDEX          # one problem again
+    python benchmarks/soak.py --scene SEED INDEX            # one closed loop again
+
+A line with counts, rates and worst figures is appended to benchmarks/results/soak.csv, on Ctrl-C too.
+"""
+
+from __future__ import annotations
+
+import argparse
+import multiprocessing
+import os
+import sys
+from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
+from pathlib import Path
+from time import perf_counter, time_ns
+
+import numpy as np
+from harness import setting
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+from soaking import batch, loops
+from soaking.problems import make
+from soaking.tally import Tally, append
+
+RESULTS = Path(__file__).parent / "results" / "soak.csv"
+BATCH, SECONDS, SCENES = 20_000, 2.0, 10_000  # problems of one job, time and most scenes of the other kind
+TOLD = 5  # failures of each kind
+ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")  # in each worker
+
+
+def job(kind: str, seed: int, first: int) -> tuple[str, object, float]:
+    """What one process does at a time."""
+    started = perf_counter()
+    if kind == "problems":
+        return kind, batch.run(seed, first, BATCH), perf_counter() - started
+    found, _ = loops.run(seed, first, SECONDS, SCENES)
+    return kind, found, perf_counter() - started
+
+
+def soak(minutes: float, share: float, seed: int, jobs: int) -> Tally:
+    """Until the time is over, or somebody interrupts."""
+    tally, console = Tally(), Console()
+    os.environ.update(ONE_THREAD)
+    batch.prepare()
+    columns = (TextColumn("{task.description}"), BarColumn(), TimeRemainingColumn())
+    pool = ProcessPoolExecutor(jobs, mp_context=multiprocessing.get_context("spawn"))
+    started, turn, pending = perf_counter(), {"problems": 0, "loops": 0}, set()
+    try:
+        with Progress(*columns, console=console) as progress:
+            bar = progress.add_task("soaking", total=60.0 * minutes)
+            while pending or perf_counter() - started < 60.0 * minutes:
+                while len(pending) < 2 * jobs and perf_counter() - started < 60.0 * minutes:
+                    spent = tally.seconds
+                    wanted = share * (spent["problems"] + spent["loops"])
+                    ahead = sum(turn.values()) % 2 == 0 if not spent["loops"] + spent["problems"] else None
+                    problems = share > 0.0 and (spent["problems"] <= wanted if ahead is None else ahead or share == 1.0)
+                    kind = "problems" if problems else "loops"
+                    first = turn[kind] * (BATCH if problems else SCENES)
+                    turn[kind] += 1
+                    pending.add(pool.submit(job, kind, seed, first))
+                done, pending = wait(pending, timeout=1.0, return_when=FIRST_COMPLETED)
+                for future in done:
+                    _add(tally, console, *future.result())
+                words = f"{tally.problems:,} problems, {tally.steps:,} steps, {tally.failed} failures"
+                progress.update(bar, completed=perf_counter() - started, description=words)
+    except KeyboardInterrupt:
+        console.print("interrupted: what was done is kept")
+    except Exception as error:  # a worker died, or a scene could not be made: a finding, and what was done is kept
+        tally.add_failure(batch.Failure(f"{type(error).__name__}: {error}", np.nan, f"--seed {seed}"))
+    finally:
+        pool.shutdown(wait=False, cancel_futures=True)
+    minutes = (perf_counter() - started) / 60.0
+    append(RESULTS, {**setting(), **tally.row(minutes, seed, jobs)})
+    return tally
+
+
+def _add(tally: Tally, console: Console, kind: str, found: object, seconds: float) -> None:
+    """One result; its failures are told with what shows them again."""
+    known, told = len(tally.failures), tally.kinds()
+    (tally.add_batch if kind == "problems" else tally.add_loops)(found, seconds)
+    for failure in tally.failures[known:]:
+        told[failure.kind] += 1
+        if told[failure.kind] <= TOLD:
+            what = f"{failure.what}, {failure.size:.2g}"
+            console.print(f"{what}: python benchmarks/soak.py {failure.command}", soft_wrap=True, markup=False)
+
+
+def again(problem: list[int] | None, scene: list[int] | None) -> int:
+    """One problem or scene once more, with all there is to see."""
+    np.set_printoptions(linewidth=120)
+    if problem:
+        found = batch.run(problem[0], problem[1], 1)
+        for name, value in zip(made_names(), make.inner(*problem)[0], strict=True):
+            print(f"{name} = {value!r}")
+    else:
+        found, _ = loops.run(scene[0], scene[1], 0.0)
+    print(found)
+    return len(found.failures)
+
+
+def made_names() -> tuple[str, ...]:
+    """The arrays of a problem."""
+    from soaking.problems import Made
+
+    return Made._fields
+
+
+def main() -> int:
+    """Soak, or show one failure again; 1 if anything failed."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--minutes", type=float, default=10.0)
+    parser.add_argument("--share", type=float, default=0.5, help="of the time that goes to problems")
+    parser.add_argument("--seed", type=int, default=time_ns() // 1_000_000_000)
+    parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1)
+    parser.add_argument("--problem", type=int, nargs=2, metavar=("SEED", "INDEX"))
+    parser.add_argument("--scene", type=int, nargs=2, metavar=("SEED", "INDEX"))
+    given = parser.parse_args()
+    if given.problem or given.scene:
+        return min(again(given.problem, given.scene), 1)
+    tally = soak(given.minutes, given.share, given.seed, given.jobs)
+    row = tally.row(given.minutes, given.seed, given.jobs)
+    Console().print("\n".join(f"{key.replace('_', ' ')}: {value}" for key, value in row.items()), highlight=False)
+    return 1 if tally.failed else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

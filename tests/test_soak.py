@@ -1,0 +1,95 @@
+"""The soak: a tiny one finds nothing, and what is wrong is found."""
+
+from __future__ import annotations
+
+import csv
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import cartctl as cc
+from tests import joint_rollouts as jr
+
+BENCHMARKS = Path(__file__).parent.parent / "benchmarks"
+pytestmark = pytest.mark.skipif(not jr.COMPILED, reason="a soak is compiled")
+
+
+@pytest.fixture(scope="module")
+def soaking():
+    """The soak's modules, as its script finds them."""
+    sys.path.insert(0, str(BENCHMARKS))
+    try:
+        from soaking import batch, loops, tally
+    finally:
+        sys.path.remove(str(BENCHMARKS))
+    batch.prepare()
+    return batch, loops, tally
+
+
+def test_a_tiny_soak_finds_nothing(soaking):
+    batch, _, _ = soaking
+    found = batch.run(seed=5, first=0, count=2000)
+    assert found.failed == 0, found.failures
+    assert (found.counts[:6] > 0).all()  # every claim there is, and rows that the box forbids
+    assert (found.worst < 1e-6).all()
+
+
+def test_an_answer_that_is_off_is_found(soaking):
+    """u moved by a thousandth: wherever something was at stake, its certificate no longer holds."""
+    batch, _, _ = soaking
+    found = [batch.run(5, index, 1, spoilt=index) for index in range(200)]
+    caught = [result.failed + result.counts[batch.GREY] for result in found]
+    assert np.mean(caught) > 0.95
+    assert all(f.command == f"--problem 5 {k}" for k, result in enumerate(found) for f in result.failures)
+
+
+def test_a_problem_is_made_by_its_seed_and_index_alone(soaking):
+    batch, _, _ = soaking
+    whole = batch.run(6, 0, 300)
+    parts = [batch.run(6, 0, 100), batch.run(6, 100, 200)]
+    np.testing.assert_array_equal(whole.counts, parts[0].counts + parts[1].counts)
+    np.testing.assert_array_equal(whole.worst, np.maximum(parts[0].worst, parts[1].worst))
+
+
+@pytest.mark.parametrize("index", [2287, 7257, 26462, 28799, 47150, 61196, 65297])
+def test_what_levels_above_settled_is_not_taken_back(soaking, index):
+    """A vertex of bounds and nearly dependent rows, which round-off made contradictory for the levels below."""
+    batch, _, _ = soaking
+    assert not batch.run(3, index, 1).failures
+
+
+@pytest.mark.parametrize("s", [0.3, 0.5, 1.0])
+def test_a_small_command_for_a_row_of_zeros_pins_the_scale(s):
+    """Of the size at which its side counted as nothing, but not its slope: s was 0."""
+    b = np.array([1.58746e5, 2.6e-3])
+    equation = cc.Equation(np.array([[-475.0], [0.0]]), b, drift=np.array([0.0, s * 2.6e-3]))
+    solution = cc.solve(cc.Problem([equation]), "sns")
+    np.testing.assert_allclose(solution.scales, [s], rtol=1e-9)
+    assert solution.certificate().holds()
+
+
+def test_a_few_loops_find_nothing_and_a_push_is_found(soaking):
+    _, loops, _ = soaking
+    found, following = loops.run(seed=3, first=0, seconds=0.0, scenes=1)
+    assert following == 1 and found.steps == loops.STEPS
+    assert not found.failures
+    pushed, _ = loops.run(seed=3, first=0, seconds=0.0, scenes=1, spoil=1e3)
+    assert [f.command for f in pushed.failures] == ["--scene 3 0"]
+
+
+def test_a_line_is_appended(soaking, tmp_path):
+    batch, loops, tally = soaking
+    total = tally.Tally()
+    total.add_batch(batch.run(5, 0, 10, spoilt=3), 0.5)
+    total.add_loops(loops.run(3, 0, 0.0, scenes=1)[0], 0.5)
+    row = total.row(minutes=1.0, seed=5, jobs=2)
+    for _ in range(2):
+        tally.append(tmp_path / "soak.csv", row)
+    with (tmp_path / "soak.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    assert rows == [row, row]
+    assert row["problems"] == "10" and row["problems_per_s"] == "40" and row["steps"] == str(loops.STEPS)
+    tally.append(tmp_path / "soak.csv", {"other": "columns"})
+    assert (tmp_path / "soak.old.csv").exists() and (tmp_path / "soak.csv").read_text() == "other\ncolumns\n"
