@@ -4,8 +4,8 @@
     python benchmarks/lwr_hexagon.py --save     # and write results/lwr_hexagon.csv and docs/lwr-hexagon.png
 
 Position task of three dimensions, a path clock where the method scales, so that the target waits for the hand. A line
-is entered at full speed: with acceleration limits, too, the hand cannot be on its path at a corner, for the clock does not
-look ahead. Published, for other positions with the same length (accelerations limited, corners cut): the rows
+is entered at full speed: with acceleration limits, too, the hand cannot be on its path at a corner, for the clock does
+not look ahead. Published, for other positions with the same length (accelerations limited, corners cut): the rows
 ``published``.
 """
 

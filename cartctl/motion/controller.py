@@ -75,6 +75,7 @@ class Controller:
         self.solver = get_solver(solver)
         self.level = get_level(level)
         self.level.check(self.solver)
+        _checked_switches(path_clock=path_clock, approach=approach)
         self._limits = usable_limits(limits, robot, self.solver, self.level)
         self.objective = _checked_objective(objective, self.solver)
         self.metric = metric
@@ -209,6 +210,12 @@ def _checked_tasks(tasks: Task | Sequence[Task], robot: Robot) -> tuple[Task, ..
             raise ProblemError(f"tasks[{k}] is a {type(task).__name__}; expected a Task")
         task.check(robot)
     return tuple(tasks)
+
+
+def _checked_switches(**switches: Any) -> None:
+    for name, value in switches.items():
+        if not (isinstance(value, bool) or (value is None and name == "path_clock")):
+            raise ParameterError(f"{name} is {value!r}; expected True or False")
 
 
 def _clocked(asked: bool | None, tasks: Sequence[Task], solver: Solver, level: Level) -> list[bool]:

@@ -77,5 +77,6 @@ def _check(arrays: dict[str, Any], tasks: list[TaskRecord], path: Path) -> None:
     lengths = {len(a) for a in per_sample} == {samples} and {len(a) for a in per_step} == {steps}
     if not lengths or samples not in (steps + 1, 0):
         raise RunFileError(f"{path} holds arrays that do not belong together; expected N + 1 samples of N steps")
-    if not all(np.isfinite(a).all() for a in [*per_sample, *per_step]):
+    scales = [np.nan_to_num(t.scale, nan=0.0) for t in tasks]  # nan where a task was skipped
+    if not all(np.isfinite(a).all() for a in [*per_sample, arrays["command"], arrays["solve_time"], *scales]):
         raise RunFileError(f"{path} holds nan or inf; expected the finite numbers that Run.save writes")

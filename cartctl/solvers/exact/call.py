@@ -19,7 +19,7 @@ from cartctl.algebra.proofs import check_proofs
 from cartctl.algebra.solution import Solution, Status
 from cartctl.algebra.svd import scale
 from cartctl.checks import FloatArray
-from cartctl.solvers.exact.kinds import CONTRADICTORY, FITTED, INTERVAL, SCALED
+from cartctl.solvers.exact.kinds import CONTRADICTORY, EXTREME, FITTED, INTERVAL, SCALED
 from cartctl.solvers.exact.lexicographic import lexicographic
 
 _KINDS = {"scale": SCALED, "least_squares": FITTED, "inequality": INTERVAL}
@@ -95,9 +95,36 @@ def _run(arrays: Arrays, n: int, guess: NDArray[np.int64], proofs: FloatArray) -
     active = np.empty(n + 2, dtype=np.int64)
     try:
         flags = lexicographic.compiled(*arrays, guess, u, scales, active, proofs)
+        if flags & EXTREME:
+            flags = lexicographic.compiled(*balanced(arrays), guess, u, scales, active, proofs)
     except (ValueError, ArithmeticError) as error:  # a singular value decomposition met infinities
         raise FloatingPointError(str(error)) from None
+    if flags & EXTREME:
+        raise FloatingPointError("entries differ by too many orders of magnitude")
     return Outcome(u, scales, flags, active)
+
+
+def balanced(arrays: Arrays) -> Arrays:
+    """The same problem with every equation, and every row of C, divided by its largest entry."""
+    A, b, d, natural = (np.array(x) for x in (arrays.A, arrays.b, arrays.d, arrays.natural))
+    row = 0
+    with np.errstate(over="ignore", under="ignore"):
+        for k, (size, kind) in enumerate(zip(arrays.sizes, arrays.fits, strict=True)):
+            if kind == INTERVAL:
+                continue
+            own = slice(row, row + size)
+            largest = float(np.abs(A[own]).max(initial=0.0)) or 1.0
+            A[own] /= largest
+            b[own] /= largest
+            d[own] = d[own] / largest if d.shape[0] else d[own]
+            natural[k] /= largest
+            row += size
+        most = np.abs(arrays.C).max(axis=1, initial=0.0)
+        most = np.where(most > 0.0, most, 1.0)
+        C = arrays.C / most[:, None]
+        return arrays._replace(
+            A=A, b=b, d=d, natural=natural, C=C, c_lower=arrays.c_lower / most, c_upper=arrays.c_upper / most
+        )
 
 
 def arrays_of(problem: Problem, fitted: bool) -> Arrays:
@@ -187,6 +214,9 @@ def certificate(solution: Solution, fitted: bool) -> Certificate:
     """Solve once more, asking for multipliers, and check them against the solution itself."""
     problem = solution.problem
     given, scales = arrays_of(problem, fitted), solution.scales
+    entries = np.abs(np.concatenate([given.A.ravel(), given.C.ravel()]))
+    if entries.max(initial=1.0) > 1e100 or entries.min(initial=1.0, where=entries > 0.0) < 1e-100:
+        given = balanced(given)
     names = [e.name for e in problem.equations]
     arrays = given if problem.metric is None else whitened(given, problem, Whitening(problem.metric))
     if solution.outcome is Status.INFEASIBLE:

@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cartctl.checks import FloatArray
 from cartctl.kernels import part
@@ -20,13 +21,13 @@ from cartctl.solvers.exact.inequalities import Inequalities, drop, normal_of, ta
 from cartctl.solvers.exact.line_search import blocked_at, lowest_at
 from cartctl.solvers.exact.proof import write_multipliers
 from cartctl.solvers.exact.scaled import MET
-from cartctl.solvers.exact.working_set import LAM, NUM, H, WorkingSet, Z, combine, orthogonalise
+from cartctl.solvers.exact.working_set import FREE, KIND, LAM, NUM, WHO, H, WorkingSet, Z, combine, orthogonalise
 
 _NOISE = 2e-8  # of the rows' size: singular values below this lead nowhere
 _REST = 1e-11  # of the largest miss: a step that changes the rows by less is none
 _ROUND_OFF = 1e-14  # of the rows' size times that of u: rows that move or miss by less do not
 _NOTHING = 1e-12  # of what is added up in a row, or may have been: a miss below this is none
-_PULLS = 1e-10  # of the rows' size times the largest miss: a multiplier below this is none
+_PULLS = 1e-9  # of the rows' size times the largest miss: a multiplier below this is none
 
 
 @part
@@ -47,7 +48,9 @@ def fitted_level(
     miss = np.empty(m)
     p = np.empty(n)
     gradient = np.empty(n)
-    lost = False
+    stays = np.zeros(q.state.shape[0], np.bool_)  # let go once and met again at once: its multiplier is round-off
+    gone, lost = np.empty(1, np.int64), False
+    gone[0] = -1
     for turn in range(most):
         count = misses(rows, low, high, u, size, miss)
         rank = _step(w, rows, miss, count, size, p)
@@ -63,12 +66,15 @@ def fitted_level(
             if far >= most_far and code >= 0:
                 left = normal_of(q, code, w)
                 take_in(q, w, code, left, 0.0)
+                stays[code >> 1] |= code == gone[0]
+            gone[0] = -1
             continue
         _slope(rows, miss, gradient)
-        weakest = _multipliers(w, gradient, size * max(_PULLS * largest, round_off))
+        weakest = _multipliers(w, gradient, size * max(_PULLS * largest, round_off), stays)
         if weakest < 0:
             write_multipliers(w, q, norm, proof)
             return MET, lost
+        gone[0] = w.K[WHO, weakest]
         drop(q, w, weakest)
     return STALLED, lost
 
@@ -178,13 +184,14 @@ def _slope(rows: FloatArray, miss: FloatArray, gradient: FloatArray) -> None:
 
 
 @part
-def _multipliers(w: WorkingSet, gradient: FloatArray, nothing: float) -> int:
+def _multipliers(w: WorkingSet, gradient: FloatArray, nothing: float, stays: NDArray[np.bool_]) -> int:
     """The gradient as a combination of the members, into lam; the free one that pulls away most, or -1."""
     for k in range(gradient.shape[0]):
         w.V[Z, k] = gradient[k]
     orthogonalise(w, np.inf)
     combine(w, w.V[H], w.V[LAM])
     for j in range(w.K[NUM, 0]):
-        if abs(w.V[LAM, j]) <= nothing:
+        unsure = w.V[LAM, j] < 0.0 and w.K[WHO, j] >= 0 and w.K[KIND, j] == FREE and stays[w.K[WHO, j] >> 1]
+        if unsure or abs(w.V[LAM, j]) <= nothing:
             w.V[LAM, j] = 0.0
     return most_negative(w)

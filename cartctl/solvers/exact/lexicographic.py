@@ -15,7 +15,7 @@ from cartctl.checks import FloatArray
 from cartctl.kernels import kernel, part
 from cartctl.solvers.exact.by_levels import by_levels
 from cartctl.solvers.exact.inequalities import Inequalities, most_violated, row_norms
-from cartctl.solvers.exact.kinds import GENERAL, INTERVAL, SCALED
+from cartctl.solvers.exact.kinds import EXTREME, GENERAL, INTERVAL, SCALED
 from cartctl.solvers.exact.proof import write_multipliers
 from cartctl.solvers.exact.rows import Equations, task_size
 from cartctl.solvers.exact.working_set import (
@@ -33,6 +33,7 @@ from cartctl.solvers.exact.working_set import (
 )
 
 _DEPENDENT = 2e-8  # of a task's own size: rows this close to each other are left to the levels
+_HUGE, _TINY = 1e120, 1e-120  # entries beyond these are left to the caller to scale
 _COARSE = 1e-2  # of the size that commands alone suggest for u: what round-off in them is relative to
 
 
@@ -70,6 +71,8 @@ def lexicographic(
     w, u = new_working_set(n), np.empty(n)
     proofs = np.zeros((p + 1, out_proofs.shape[1]))
     e, q = _arrays(A_, b, d, fits, sizes, lower, upper, C_, c_lower, c_upper, reference, n)
+    if _extreme(e, q.C, q.norm):
+        return EXTREME
     soft = 0
     for k in range(p):
         if fits[k] == INTERVAL:
@@ -102,6 +105,21 @@ def lexicographic(
         for i in range(out_proofs.shape[1]):
             out_proofs[k, i] = proofs[k, i]
     return flags
+
+
+@part
+def _extreme(e: Equations, C: FloatArray, c_norm: FloatArray) -> bool:
+    """Whether squares of a row over- or underflow, so that its norm means nothing."""
+    M, n = e.A.shape
+    for i in range(M + C.shape[0]):
+        norm = e.norm[i] if i < M else c_norm[n + i - M]
+        if norm > _TINY and norm < _HUGE and norm != 1.0:
+            continue
+        for k in range(n):
+            x = abs(e.A[i, k] if i < M else C[i - M, k])
+            if x > _HUGE or 0.0 < x < _TINY:
+                return True
+    return False
 
 
 @part
