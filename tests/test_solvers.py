@@ -202,6 +202,7 @@ def test_beyond_the_square_root_of_the_range(solver, size):
         if rank == 3 and isinstance(getattr(solver, "policy", None), Truncated):
             assert solution.status in (Status.OPTIMAL, Status.FAILED)
         clamped = isinstance(getattr(solver, "policy", None), SelectivelyDamped)
+        clamped = clamped or solver.name == "qp"  # whose damping is relative to the tasks
         if rank == 3 and size > 1.0 and solution.status is not Status.FAILED and not clamped:
             np.testing.assert_allclose(A @ solution.u, A @ u, atol=tol.ORACLE)  # no damping is felt up here
 
