@@ -23,7 +23,7 @@ demo: $(READY)  ## the Panda's hand follows a circle, its redundancy keeps the j
 	@$(BIN)/cartctl track panda --path circle --solver projected-gradient --out out
 
 test: $(READY)  ## all tests
-	@$(BIN)/python -m pytest -n $(JOBS)
+	@OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n $(JOBS)
 
 lint: $(READY)  ## ruff and mypy
 	@$(BIN)/ruff check .
