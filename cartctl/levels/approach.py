@@ -11,16 +11,15 @@ task's Jacobian, ``J v_i = sigma_i u_i``, with the curvature ``h_i = J_dot(v_i) 
 - the singular configuration is ``theta_i = sigma_i / |u_i . h_i|`` away: towards it
   ``|u_i . b| <= sigma_i min(f(theta_i), eta theta_i / dt)``.
 
-What ranks below a task at the edge moves no faster than the last of these, for in the null space, too, the task curves;
-there its own Jacobian may be singular, see :func:`calmed`. It stands where the edge was reached. On the way back from
-the edge, an arm bends the way it was bent before. Joints that a limit keeps from doing their part are left out of J.
-Far from edge and target, nothing is changed.
+What ranks below a task at the edge moves no faster than the last of these, for in the null space, too, the task curves.
+On the way back from the edge, an arm bends the way it was bent before. Joints that a limit keeps from doing their part
+are left out of J. Far from edge and target, nothing is changed.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from typing import NamedTuple
 
 import numpy as np
@@ -37,7 +36,6 @@ _AT_REST = 1e-6  # of the velocity limit: a bound this close to zero blocks
 _BENT = 1e-3  # of the Jacobian's size: above this singular value it is clear how an arm is bent
 _BENDS = 0.5  # of what one direction may count on: what a path's bends may take, so that it can also slow down
 _CLEAR = 1e-2  # of the Jacobian's size: damping, for near a singularity a path's bends would ask for it to stand
-_NO_FREEDOM = 1e-9  # of the largest: singular values of the tasks above below this leave a motion free
 _NOTHING = np.zeros(0)
 
 
@@ -64,8 +62,6 @@ class Approach:
         self._joints = np.array([slowing, speed, still])
         self._dt, self._scratch, self._scales = dt, scratch, scales
         self._bent: dict[int, FloatArray] = {}  # by task: the motion inwards, when it was last clear
-        self._first: Task | None = None
-        self._above: list[tuple[FloatArray, FloatArray]] = []  # J and b of the tasks above, in this step
         self._directions, self._hold = directions.compiled, hold.compiled
 
     def command(
@@ -83,16 +79,10 @@ class Approach:
 
         calm: the largest speed of joints, in the norm of v, that the tasks above leave to this one.
         """
-        if self._first is None or task is self._first:  # a step begins
-            self._first = task
-            self._above.clear()
         edge, pace = math.inf, 1.0
         if J.shape[0] and task.fit == "scale":
             b, edge, pace = self._held(task, state, J, reference, b, lower, upper)
-        if calm < math.inf:
-            b = calmed(J, b, self._above, calm)
-        self._above.append((J, b))
-        return Approached(b, min(calm, edge), pace)
+        return Approached(b if calm == math.inf else calmed(J, b, calm), min(calm, edge), pace)
 
     def _held(
         self,
@@ -165,24 +155,9 @@ class Approach:
     def reset(self) -> None:
         """Forget how the arm was bent."""
         self._bent.clear()
-        self._above.clear()
 
 
-def calmed(J: FloatArray, b: FloatArray, above: Sequence[tuple[FloatArray, FloatArray]], calm: float) -> FloatArray:
-    """``b`` (m,) slowed down until the motion that the tasks above leave to it is no faster than ``calm``.
-
-    With N their null space and v_a the least motion that does what they ask, it takes ``J N w = b - J v_a``. At the
-    edge J N may lose rank, and what little of a direction is left would be paid for with any speed; so
-    ``|w_i| <= calm`` for each singular direction, then ``||w|| <= calm``.
-    """
-    A = np.concatenate([rows for rows, _ in above])
-    U, s, Vt = np.linalg.svd(A)
-    rank = int(np.count_nonzero(s > _NO_FREEDOM * s[0])) if s.size else 0
-    given = Vt[:rank].T @ ((U[:, :rank].T @ np.concatenate([asked for _, asked in above])) / s[:rank])
-    N = Vt[rank:].T
-    L, t, _ = np.linalg.svd(J @ N, full_matrices=False)
-    base = J @ given
-    left = np.clip(L.T @ (b - base), -calm * t, calm * t)
-    fastest = float(np.linalg.norm(left[t > 0.0] / t[t > 0.0]))
-    slowed: FloatArray = base + L @ left * (calm / fastest if fastest > calm else 1.0)
-    return slowed
+def calmed(J: FloatArray, b: FloatArray, calm: float) -> FloatArray:
+    """``b`` slowed down until the least motion that delivers it is no faster than ``calm`` in the norm of v."""
+    fastest = float(np.linalg.norm(np.linalg.lstsq(J, b, rcond=1e-6)[0]))
+    return b * (calm / fastest) if fastest > calm else b

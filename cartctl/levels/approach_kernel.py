@@ -126,8 +126,9 @@ def _matters(d: FloatArray, far: float, size: float, dt: float) -> bool:
 @kernel("float(vector, matrix, matrix, float, float, bool, out_vector)")
 def hold(b: FloatArray, U: FloatArray, D: FloatArray, dt: float, size: float, scales: bool, out: FloatArray) -> float:
     """Fill out (m,) with what of b the robot can still stop; the speed of joints left to what ranks below."""
-    m, calm, held = b.shape[0], np.inf, False
-    part, rest = np.zeros(m), b.copy()
+    m, calm = b.shape[0], np.inf
+    for i in range(m):
+        out[i] = b[i]
     for k in range(D.shape[1]):
         d = D[:, k]
         asked = d[FORWARD] + d[FEEDBACK]
@@ -135,14 +136,9 @@ def hold(b: FloatArray, U: FloatArray, D: FloatArray, dt: float, size: float, sc
         if d[SIGMA] > _NOTHING * size:
             allowed, quiet = _allowed(d, dt, size, scales)
             calm = min(calm, quiet)
-        held = held or allowed != asked
-        for i in range(m):
-            part[i] += U[i, k] * allowed
-            rest[i] -= U[i, k] * asked
-    # Put together, not taken away: the round-off of what is held back would be moved by joints, over sigma.
-    whole = D.shape[1] == m
-    for i in range(m):
-        out[i] = (part[i] if whole else part[i] + rest[i]) if held else b[i]
+        if allowed != asked:
+            for i in range(m):
+                out[i] += U[i, k] * (allowed - asked)
     return calm
 
 
