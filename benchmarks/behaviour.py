@@ -5,10 +5,11 @@
     python benchmarks/behaviour.py --solvers sns hqp --scenarios jump
 
 8 s at dt = 10 ms each. Speeds and accelerations are per limit of the joint that is nearest to its own (data sheet);
-flips are joint sign reversals in the last 2 s, of 1393 possible (on the circle, which never rests, they mean nothing).
-Gain 20 1/s; 60 on the circle, where the target's acceleration v^2/r leaves dt v^2/(2 r k) between hand and path: 1 mm
-takes 30 1/s and more. ``sing_over`` runs without path clock: a path that leaves the workspace would wait at the edge
-for ever.
+flips are joint sign reversals in the last 2 s, of 1393 possible (on the circle, which never rests, they mean nothing),
+reversals those of all 8 s: where a scale is the largest possible at every instant, joints jump from one corner of their
+bounds to another on the way, unless accelerations are limited. Gain 20 1/s; 60 on the circle, where the target's
+acceleration a leaves about a dt/(2 k) between hand and path: 2.0 mm at 20, 0.8 mm at 60. ``sing_over`` runs without
+path clock: a path that leaves the workspace would wait at the edge for ever.
 """
 
 from __future__ import annotations

@@ -100,6 +100,7 @@ class Figures:
         return {
             "final_speed": self.speeds[-1],
             "flips": self.flips(),
+            "reversals": self.flips(len(self.trace.v) * self.dt),
             "peak_speed": self.speeds.max(),
             "peak_acceleration": self.accelerations.max(),
             "violation_rad": self.violation,
