@@ -6,9 +6,9 @@ import numpy as np
 
 from cartctl.algebra import proofs as check
 from cartctl.kernels import part
+from cartctl.solvers.exact.call import Arrays
 from cartctl.solvers.exact.kinds import CONTRADICTORY, FITTED, INTERVAL, SCALED, STUCK
 from cartctl.solvers.exact.lexicographic import lexicographic
-from soaking.problems import Made
 
 _solve, _check = part(lexicographic.function), part(check.check_proofs.function)
 
@@ -30,8 +30,7 @@ def demoted(m, hard):
     sizes, fits, natural = np.empty(p + 1, np.int64), np.empty(p + 1, np.int64), np.zeros(p + 1)
     sizes[0], fits[0] = hard, INTERVAL
     sizes[1:], fits[1:], natural[1:] = m.sizes, m.fits, m.natural
-    rows, box = (m.C, m.c_lower, m.c_upper), (m.lower, m.upper)
-    return Made(m.A, m.b, m.d, sizes, fits, natural, *box, *rows, m.reference, m.guess)
+    return Arrays(m.A, m.b, m.d, sizes, fits, natural, m.lower, m.upper, m.C, m.c_lower, m.c_upper, m.reference)
 
 
 @part
@@ -49,7 +48,7 @@ def solved(m, n, guess, proofs):
 def judged(made, n, spoilt, worst, counts):
     """Solve, from a guess if there is one, and check by the proofs of another solution without: failure, its size."""
     nobody, none = np.zeros(1, np.int64), np.empty((0, 0))
-    m = made
+    m = made.arrays
     hard = m.C.shape[0]
     for k in range(m.sizes.shape[0]):
         hard -= m.sizes[k] if m.fits[k] == INTERVAL else 0
@@ -59,11 +58,11 @@ def judged(made, n, spoilt, worst, counts):
         counts[CONTRADICTIONS] += 1
         if hard == 0:
             return STUCK_AT, 1.0
-        m = demoted(made, hard)
+        m = demoted(m, hard)
         proofs = np.zeros((m.sizes.shape[0] + 1, m.A.shape[0] + n + m.C.shape[0]))
         u, scales, flags = solved(m, n, nobody, proofs)
-    if m.guess[0] > 0:
-        u, scales, again = solved(m, n, m.guess, none)
+    if made.guess[0] > 0:
+        u, scales, again = solved(m, n, made.guess, none)
         flags |= again
     if flags & (STUCK | CONTRADICTORY):
         return STUCK_AT, float(flags)

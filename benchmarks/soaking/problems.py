@@ -10,8 +10,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from cartctl.checks import FloatArray
 from cartctl.kernels import part
+from cartctl.solvers.exact.call import Arrays
 from cartctl.solvers.exact.kinds import FITTED, INTERVAL, SCALED
 from soaking.bounds import box, intervals
 from soaking.draws import between, chance, new_state, normal, power, share, whole
@@ -19,20 +19,9 @@ from soaking.matrices import fill, pick_kind
 
 
 class Made(NamedTuple):
-    """The engine's arguments, in its order; guess: random codes, or none."""
+    """The engine's arguments, and random codes to start from, or none."""
 
-    A: FloatArray
-    b: FloatArray
-    d: FloatArray
-    sizes: NDArray[np.int64]
-    fits: NDArray[np.int64]
-    natural: FloatArray
-    lower: FloatArray
-    upper: FloatArray
-    C: FloatArray
-    c_lower: FloatArray
-    c_upper: FloatArray
-    reference: FloatArray
+    arrays: Arrays
     guess: NDArray[np.int64]
 
 
@@ -83,7 +72,8 @@ def make(seed, index):
             guess[i] = whole(state, 0, 2 * (n + hard + soft) - 1)
     natural = np.zeros(p)
     drift = d if np.abs(d).sum() > 0.0 else np.empty(0)
-    return Made(A, b, drift, sizes, fits, natural, lower, upper, C, c_lower, c_upper, reference, guess), n, grey
+    arrays = Arrays(A, b, drift, sizes, fits, natural, lower, upper, C, c_lower, c_upper, reference)
+    return Made(arrays, guess), n, grey
 
 
 @part

@@ -48,6 +48,11 @@ def as_metric(value: Any, n: int, name: str = "metric") -> FloatArray:
     return full
 
 
+def weighed(W: FloatArray | None, u: FloatArray) -> FloatArray:
+    """``W u``, (n,), for a metric of any form; None is the identity."""
+    return u if W is None else W * u if W.ndim == 1 else W @ u
+
+
 def _factor(W: FloatArray, name: str) -> FloatArray:
     n = W.shape[0]
     L, info = lapack.dpotrf(W, lower=1, clean=1)

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cartctl.algebra.certificate import Certificate
+from cartctl.algebra.metric import weighed
 from cartctl.algebra.problem import Equation, Inequality, Problem
 from cartctl.algebra.svd import norm, scale
 from cartctl.checks import FloatArray
@@ -98,8 +99,6 @@ class Solution:
         status: Status | None = None,
         lost_rank: bool = False,
         scales: FloatArray | None = None,
-        saturated: NDArray[np.int8] | None = None,
-        saturated_rows: NDArray[np.int8] | None = None,
     ) -> None:
         self.problem = problem
         self.u = u
@@ -110,8 +109,8 @@ class Solution:
         self._method = method
         self._status = status
         self._scales = scales
-        self._saturated = saturated
-        self._saturated_rows = saturated_rows
+        self._saturated: NDArray[np.int8] | None = None
+        self._saturated_rows: NDArray[np.int8] | None = None
         self._residuals: FloatArray | None = None
         self._task_part: FloatArray | None = None
 
@@ -193,7 +192,7 @@ class Solution:
         """
         p = self.problem
         step = self.u if p.reference is None else self.u - p.reference
-        force = step if p.metric is None else p.metric * step if p.metric.ndim == 1 else p.metric @ step
+        force = weighed(p.metric, step)
         A = np.concatenate([e.A for e in p.equations])
         stacked = np.linalg.lstsq(A.T, force, rcond=None)[0] if A.size else np.zeros(A.shape[0])
         return np.split(stacked, np.cumsum(p.sizes)[:-1])

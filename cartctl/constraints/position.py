@@ -97,7 +97,7 @@ class PositionConstraint(Constraint):
         """The largest speed towards a bound, from the room before it; negative: the way back, by factor / dt."""
         free = room.distance - 2.0 * room.error
         fastest = np.maximum(self.recovery_speed, room.error / dt)
-        back = np.clip((room.distance - room.error) * (factor / dt), -fastest, 0.0)
+        back = np.minimum(np.maximum((room.distance - room.error) * (factor / dt), -fastest), 0.0)
         return np.where(free >= 0.0, allowed_speed(free, self.deceleration, dt), back)
 
     def acceleration_rows(self, state: State, dt: float, box: Box | None = None) -> Rows:

@@ -7,18 +7,13 @@ an answer at s = 0; a task below the first, whose s = 0 the ones above may rule 
 
 from __future__ import annotations
 
-import numpy as np
-
 from cartctl.algebra.problem import Equation, Problem
 from cartctl.checks import FloatArray
 
 
 def towards_rest(problem: Problem, skipped: FloatArray, stopping: FloatArray) -> Problem:
     """The problem with its skipped equations (p,) replaced; stopping: (n,)."""
-    if problem.lower is not None:
-        stopping = np.maximum(stopping, problem.lower)
-    if problem.upper is not None:
-        stopping = np.minimum(stopping, problem.upper)
+    stopping = problem.clip(stopping)
     first = True
     equations = []
     for e, out in zip(problem.equations, skipped, strict=True):

@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from cartctl.algebra.certificate import Certificate, LevelCertificate
+from cartctl.algebra.metric import weighed
 from cartctl.algebra.problem import Problem
 from cartctl.checks import FloatArray
 
@@ -20,8 +21,7 @@ def weighted_certificate(
     """Residuals of the statement for u (n,), from multipliers that are positive at *upper* bounds."""
     terms = [e.weight * (e.A.T @ e.miss(u, 1.0)) for e in problem.equations]
     step = u if problem.reference is None else u - problem.reference
-    W = problem.metric
-    terms.append(rho * (step if W is None else W * step if W.ndim == 1 else W @ step))
+    terms.append(rho * weighed(problem.metric, step))
     C, c_low, c_high = problem.constraints or (np.zeros((0, problem.n)), np.zeros(0), np.zeros(0))
     low = np.full(problem.n, -np.inf) if problem.lower is None else problem.lower
     high = np.full(problem.n, np.inf) if problem.upper is None else problem.upper

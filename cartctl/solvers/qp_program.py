@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cartctl.algebra.metric import Whitening
+from cartctl.algebra.metric import Whitening, weighed
 from cartctl.algebra.problem import Problem
 from cartctl.algebra.svd import norm, scale
 from cartctl.checks import FloatArray
@@ -61,7 +61,7 @@ class Program(NamedTuple):
 
     def weigh(self, v: FloatArray) -> FloatArray:
         """``W v``, (n,)."""
-        return self.W * v if self.W.ndim == 1 else self.W @ v
+        return weighed(self.W, v)
 
     def hessian(self) -> FloatArray:
         """``A^T A + rho W``, (n, n)."""

@@ -12,9 +12,9 @@ from cartctl.kernels import part
 from cartctl.solvers.exact.descent import SETTLED, STALLED, load, settle
 from cartctl.solvers.exact.fitted import fitted_level
 from cartctl.solvers.exact.inequalities import EQUAL, OUT, SILENT, Inequalities, drop_all_free, normal_of
-from cartctl.solvers.exact.kinds import CONTRADICTORY, FITTED, INTERVAL, LOST_RANK, SCALED, STUCK
+from cartctl.solvers.exact.kinds import CONTRADICTORY, FITTED, LOST_RANK, SCALED, STUCK
 from cartctl.solvers.exact.proof import write_multipliers
-from cartctl.solvers.exact.rows import Equations, fix_rows, task_size
+from cartctl.solvers.exact.rows import Equations, Levels, fix_rows, task_size
 from cartctl.solvers.exact.scaled import MET, SKIPPED, scaled_level
 from cartctl.solvers.exact.working_set import (
     FIXED,
@@ -28,6 +28,7 @@ from cartctl.solvers.exact.working_set import (
     append,
     combine,
     copy_members,
+    largest_entry,
     new_working_set,
 )
 
@@ -39,9 +40,7 @@ def by_levels(
     w: WorkingSet,
     q: Inequalities,
     e: Equations,
-    sizes: NDArray[np.int64],
-    fits: NDArray[np.int64],
-    natural: FloatArray,
+    levels: Levels,
     members: int,
     start: NDArray[np.int64],
     u: FloatArray,
@@ -53,10 +52,10 @@ def by_levels(
 
     CONTRADICTORY, and nothing else, where hard rows and box exclude each other.
     """
+    sizes, fits, begin, hard = levels.sizes, levels.fits, levels.begin, levels.hard
     n, p = u.shape[0], sizes.shape[0]
     saved, states = new_working_set(n), np.empty(q.state.shape[0], np.int64)
     flags = 0
-    begin, hard = _beginnings(sizes, fits, q.C.shape[0])
     for i in range(n + hard, q.state.shape[0]):
         q.state[i] = SILENT
     if p > 0 and fits[0] == SCALED and 0 < sizes[0] <= members:
@@ -79,7 +78,7 @@ def by_levels(
         proof = proofs[min(k, proofs.shape[0] - 1)]
         scales[k] = 1.0
         if fits[k] == SCALED:
-            size = task_size(e, first, last, natural[k])
+            size = task_size(e, first, last, levels.natural[k])
             outcome, scales[k], lost = scaled_level(w, q, e, first, last, size, members, start, proof, u, most)
             settled = outcome == MET
         else:
@@ -89,14 +88,14 @@ def by_levels(
             if code != SETTLED:
                 outcome, lost = (SKIPPED if code >= 0 else STALLED), False
             elif fits[k] == FITTED:
-                size = task_size(e, first, last, natural[k])
+                size = task_size(e, first, last, levels.natural[k])
                 target = e.base[first:last]
                 outcome, lost = fitted_level(w, q, e.A[first:last], target, target, size, e.norm, proof, u, most)
                 if outcome == MET:
                     _press(w, q)
                     fix_rows(w, e, first, last, size, u)
             else:
-                outcome, lost = _keep_interval(w, q, first, last, e.norm, proof, u, most)
+                outcome, lost = _keep_interval(w, q, first, last, e.norm, proof, u, most), False
                 if outcome == MET:
                     _press(w, q)
                     _settle_interval(w, q, first, last, u)
@@ -130,24 +129,6 @@ def by_levels(
 
 
 @part
-def _beginnings(sizes: NDArray[np.int64], fits: NDArray[np.int64], rows: int) -> tuple[NDArray[np.int64], int]:
-    """The first row of each level, in the equations or in C; how many rows of C are hard."""
-    begin = np.empty(sizes.shape[0], np.int64)
-    hard = rows
-    for k in range(sizes.shape[0]):
-        if fits[k] == INTERVAL:
-            hard -= sizes[k]
-    row, soft = 0, hard
-    for k in range(sizes.shape[0]):
-        begin[k] = soft if fits[k] == INTERVAL else row
-        if fits[k] == INTERVAL:
-            soft += sizes[k]
-        else:
-            row += sizes[k]
-    return begin, hard
-
-
-@part
 def _lock(w: WorkingSet, q: Inequalities) -> None:
     """Joints with one value are equalities from the start."""
     for i in range(w.Q.shape[1]):
@@ -177,22 +158,20 @@ def _keep_interval(
     proof: FloatArray,
     u: FloatArray,
     most: int,
-) -> tuple[int, bool]:
+) -> int:
     """Rows first..last of C missed by as little as possible."""
     n, size = u.shape[0], 0.0
     for r in range(first, last):
         size += q.norm[n + r] * q.norm[n + r]
     low, high = q.B[0, n + first : n + last], q.B[1, n + first : n + last]
     outcome, _ = fitted_level(w, q, q.C[first:last], low, high, math.sqrt(size), norm, proof, u, most)
-    return outcome, False
+    return outcome
 
 
 @part
 def _settle_interval(w: WorkingSet, q: Inequalities, first: int, last: int, u: FloatArray) -> None:
     """Rows that are met go on as inequalities, rows that are missed as equalities."""
-    n, reach = u.shape[0], q.norm[q.state.shape[0]]
-    for k in range(n):
-        reach = max(reach, abs(u[k]))
+    n, reach = u.shape[0], max(q.norm[q.state.shape[0]], largest_entry(u))
     for r in range(first, last):
         x, miss = _miss(q, r, u)
         if abs(miss) <= _MISSED * q.norm[n + r] * reach:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cartctl.algebra.certificate import Certificate, LevelCertificate
-from cartctl.algebra.metric import Whitening
+from cartctl.algebra.metric import Whitening, weighed
 from cartctl.algebra.problem import Problem
 from cartctl.algebra.proofs import check_proofs
 from cartctl.algebra.solution import Solution, Status
@@ -63,12 +63,7 @@ def answer(problem: Problem, fitted: bool, start: Solution | None) -> Outcome:
         return _yielding(arrays_of(problem, fitted), problem, guess)
     white = Whitening(problem.metric)
     found = _yielding(whitened(arrays_of(problem, fitted), problem, white), problem, guess)
-    u = white.back(found.u)
-    if problem.lower is not None:
-        u = np.maximum(u, problem.lower)
-    if problem.upper is not None:
-        u = np.minimum(u, problem.upper)
-    return found._replace(u=u)
+    return found._replace(u=problem.clip(white.back(found.u)))
 
 
 def _yielding(arrays: Arrays, problem: Problem, guess: NDArray[np.int64]) -> Outcome:
@@ -225,9 +220,9 @@ def certificate(solution: Solution, fitted: bool) -> Certificate:
     p, M, r = len(names), given.A.shape[0], given.C.shape[0]
     proofs = _proofs(arrays, problem, np.zeros((p + 1, M + problem.n + r)))
     u, u0, W = solution.u, problem.reference, problem.metric
-    force = _weighed(W, u if u0 is None else u - u0)
+    force = weighed(W, u if u0 is None else u - u0)
     sizes = np.abs(u) if u0 is None else np.abs(u) + np.abs(u0)
-    pull, reach = float(_weighed(None if W is None else np.abs(W), sizes).max()), float(sizes.max())
+    pull, reach = float(weighed(None if W is None else np.abs(W), sizes).max()), float(sizes.max())
     residuals = np.zeros((p + 1, 3))
     arguments = (given.A, given.b, given.d, given.sizes, given.fits, given.natural, given.lower, given.upper)
     rows = (given.C, given.c_lower, given.c_upper)
@@ -237,11 +232,6 @@ def certificate(solution: Solution, fitted: bool) -> Certificate:
     return Certificate(
         tuple(LevelCertificate(name, claim, three[0], three[1], three[2], z) for name, claim, three, z in levels)
     )
-
-
-def _weighed(W: FloatArray | None, u: FloatArray) -> FloatArray:
-    """``W u``."""
-    return u if W is None else W * u if W.ndim == 1 else W @ u
 
 
 def _proofs(arrays: Arrays, problem: Problem, proofs: FloatArray) -> FloatArray:

@@ -36,6 +36,7 @@ from cartctl.solvers.exact.working_set import (
     WorkingSet,
     Z,
     combine,
+    largest_entry,
     noise,
     place,
 )
@@ -132,10 +133,8 @@ def _first_in_the_way(w: WorkingSet, floor: float) -> tuple[int, float]:
 @part
 def _touches(w: WorkingSet, side: float, u: FloatArray, s: float) -> bool:
     """Whether the newcomer, a combination of the members, contradicts them by no more than round-off in their sum."""
-    missing, total, size = side, 0.0, abs(side)
+    missing, total, size = side, 0.0, max(abs(side), largest_entry(u))
     settled = True  # by levels above alone: it was met there, before their members were exchanged
-    for k in range(u.shape[0]):
-        size = max(size, abs(u[k]))
     for j in range(w.K[NUM, 0]):
         missing -= w.V[SUM, j] * (w.V[C0, j] + s * w.V[C1, j])
         total += abs(w.V[SUM, j]) * max(abs(w.V[C0, j]), abs(s * w.V[C1, j]), size)

@@ -21,7 +21,19 @@ from cartctl.solvers.exact.inequalities import Inequalities, drop, normal_of, ta
 from cartctl.solvers.exact.line_search import blocked_at, lowest_at
 from cartctl.solvers.exact.proof import write_multipliers
 from cartctl.solvers.exact.scaled import MET
-from cartctl.solvers.exact.working_set import FREE, KIND, LAM, NUM, WHO, H, WorkingSet, Z, combine, orthogonalise
+from cartctl.solvers.exact.working_set import (
+    FREE,
+    KIND,
+    LAM,
+    NUM,
+    WHO,
+    H,
+    WorkingSet,
+    Z,
+    combine,
+    largest_entry,
+    orthogonalise,
+)
 
 _NOISE = 2e-8  # of the rows' size: singular values below this lead nowhere
 _REST = 1e-11  # of the largest miss: a step that changes the rows by less is none
@@ -52,14 +64,14 @@ def fitted_level(
     gone, lost = np.empty(1, np.int64), False
     gone[0] = -1
     for turn in range(most):
-        count = misses(rows, low, high, u, size, miss)
+        count = _misses(rows, low, high, u, miss)
         rank = _step(w, rows, miss, count, size, p)
         if turn == 0:
             lost = rank < min(m, n - w.K[NUM, 0])
         largest = _largest(rows, u, float(q.norm[q.state.shape[0]]), miss)
-        round_off = _ROUND_OFF * size * _length(u)
+        round_off = _ROUND_OFF * size * largest_entry(u)
         if _moves(rows, p, largest, round_off):
-            most_far, code = blocked_at(q, w, u, p)
+            most_far, code = blocked_at(q, u, p)
             far = lowest_at(rows, low, high, u, p, most_far)
             for k in range(n):
                 u[k] += far * p[k]
@@ -80,7 +92,7 @@ def fitted_level(
 
 
 @part
-def misses(rows: FloatArray, low: FloatArray, high: FloatArray, u: FloatArray, size: float, miss: FloatArray) -> int:
+def _misses(rows: FloatArray, low: FloatArray, high: FloatArray, u: FloatArray, miss: FloatArray) -> int:
     """What is missing from each row to its interval, signed, 0 inside; how many rows count."""
     count = 0
     for i in range(rows.shape[0]):
@@ -140,7 +152,7 @@ def _step(w: WorkingSet, rows: FloatArray, miss: FloatArray, count: int, size: f
 @part
 def _largest(rows: FloatArray, u: FloatArray, unit: float, miss: FloatArray) -> float:
     """The largest miss; those that are nothing are set to zero."""
-    largest, reach = 0.0, max(unit, _length(u))
+    largest, reach = 0.0, max(unit, largest_entry(u))
     for i in range(rows.shape[0]):
         total, length = 0.0, 0.0
         for k in range(rows.shape[1]):
@@ -149,15 +161,6 @@ def _largest(rows: FloatArray, u: FloatArray, unit: float, miss: FloatArray) -> 
         if abs(miss[i]) <= _NOTHING * (total + length * reach):
             miss[i] = 0.0
         largest = max(largest, abs(miss[i]))
-    return largest
-
-
-@part
-def _length(u: FloatArray) -> float:
-    """The largest entry."""
-    largest = 0.0
-    for k in range(u.shape[0]):
-        largest = max(largest, abs(u[k]))
     return largest
 
 

@@ -14,7 +14,19 @@ from numpy.typing import NDArray
 
 from cartctl.checks import FloatArray
 from cartctl.kernels import part
-from cartctl.solvers.exact.working_set import FIXED, FREE, KIND, NUM, WHO, WorkingSet, Z, append, orthogonalise, remove
+from cartctl.solvers.exact.working_set import (
+    FIXED,
+    FREE,
+    KIND,
+    NUM,
+    WHO,
+    WorkingSet,
+    Z,
+    append,
+    largest_entry,
+    orthogonalise,
+    remove,
+)
 
 # Not in the set; in it; met with it; an equality; not yet in force; met with it up to round-off.
 OUT, MEMBER, IMPLIED, EQUAL, SILENT, TOUCHED = 0, 1, 2, 3, 4, 5
@@ -59,9 +71,7 @@ def normal_of(q: Inequalities, code: int, w: WorkingSet) -> float:
 def most_violated(q: Inequalities, u: FloatArray) -> int:
     """The code of the inequality that u misses by most, -1 where all are met."""
     B, norm, state, n = q.B, q.norm, q.state, u.shape[0]
-    size = norm[state.shape[0]]
-    for i in range(n):
-        size = max(size, abs(u[i]))
+    size = max(norm[state.shape[0]], largest_entry(u))
     worst, code = 0.0, -1
     for i in range(state.shape[0]):
         if state[i] != OUT:

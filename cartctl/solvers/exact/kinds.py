@@ -1,4 +1,7 @@
 """What a level can be, and what an answer's flags say."""
 
-SCALED, FITTED, INTERVAL = 0, 1, 2
-CONTRADICTORY, STUCK, LOST_RANK, GENERAL, EXTREME = 1, 2, 4, 8, 16
+from cartctl.algebra.proofs import FITTED, INTERVAL, SCALED
+
+__all__ = ["CONTRADICTORY", "EXTREME", "FITTED", "INTERVAL", "LOST_RANK", "SCALED", "STUCK"]
+
+CONTRADICTORY, STUCK, LOST_RANK, EXTREME = 1, 2, 4, 8

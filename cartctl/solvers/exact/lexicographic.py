@@ -15,24 +15,21 @@ from cartctl.checks import FloatArray
 from cartctl.kernels import kernel, part
 from cartctl.solvers.exact.by_levels import by_levels
 from cartctl.solvers.exact.inequalities import Inequalities, most_violated, row_norms
-from cartctl.solvers.exact.kinds import EXTREME, GENERAL, INTERVAL, SCALED
+from cartctl.solvers.exact.kinds import EXTREME, INTERVAL, SCALED
 from cartctl.solvers.exact.proof import write_multipliers
-from cartctl.solvers.exact.rows import Equations, task_size
+from cartctl.solvers.exact.rows import Equations, Levels, level_table, take_apart, task_size
 from cartctl.solvers.exact.working_set import (
     LAM,
     NUM,
     WHO,
     G,
     WorkingSet,
-    Z,
     append,
     combine,
     new_working_set,
-    orthogonalise,
     place,
 )
 
-_DEPENDENT = 2e-8  # of a task's own size: rows this close to each other are left to the levels
 _HUGE, _TINY = 1e120, 1e-120  # entries beyond these are left to the caller to scale
 _COARSE = 1e-2  # of the size that commands alone suggest for u: what round-off in them is relative to
 
@@ -64,29 +61,26 @@ def lexicographic(
     """Fill out (n,), scales (p,), active (count, then codes) and, if it has columns, out_proofs (p + 1, M + n + r).
 
     sizes, fits, scale: rows, kind and natural norm (0: that of A) of each level. d, reference, lower and upper may be
-    empty. Rows of interval levels are the last ones of C, in order. start: a guess of the
-    active inequalities, as ``active`` is.
+    empty. Rows of interval levels are the last ones of C, in order. start: a guess of the active inequalities, as
+    ``active`` is.
     """
     n, M, p = out.shape[0], A_.shape[0], sizes.shape[0]
     w, u = new_working_set(n), np.empty(n)
     proofs = np.zeros((p + 1, out_proofs.shape[1]))
-    e, q = _arrays(A_, b, d, fits, sizes, lower, upper, C_, c_lower, c_upper, reference, n)
+    levels = level_table(sizes, fits, scale, C_.shape[0])
+    e, q = _arrays(A_, b, d, levels, lower, upper, C_, c_lower, c_upper, reference, n)
     if _extreme(e, q.C, q.norm):
         return EXTREME
-    soft = 0
-    for k in range(p):
-        if fits[k] == INTERVAL:
-            soft += sizes[k]
     most = 50 + 10 * (M + q.state.shape[0])
     flags = 0
     members = 0
     done = False
-    if soft == 0 and M <= n:
-        done, members = _all_at_once(w, q, e, sizes, scale, u, proofs)
+    if levels.hard == C_.shape[0] and M <= n:
+        done, members = _all_at_once(w, q, e, levels, u, proofs)
         for k in range(p):
             scales[k] = 1.0
     if not done:
-        flags = GENERAL | by_levels(w, q, e, sizes, fits, scale, members, start, u, scales, proofs, most)
+        flags = by_levels(w, q, e, levels, members, start, u, scales, proofs, most)
     active[0] = 0
     for j in range(w.K[NUM, 0]):
         if w.K[WHO, j] >= 0:
@@ -127,8 +121,7 @@ def _arrays(
     A_: FloatArray,
     b: FloatArray,
     d: FloatArray,
-    fits: NDArray[np.int64],
-    sizes: NDArray[np.int64],
+    levels: Levels,
     lower: FloatArray,
     upper: FloatArray,
     C_: FloatArray,
@@ -145,17 +138,16 @@ def _arrays(
     norm, base, slope = lines[0], lines[1], lines[2]
     shifted = reference.shape[0] > 0
     unit = 0.0
-    row = 0
+    sizes, fits, begin = levels.sizes, levels.fits, levels.begin
     for k in range(sizes.shape[0]):
         if fits[k] == INTERVAL:
             continue
-        for i in range(row, row + sizes[k]):
+        for i in range(begin[k], begin[k] + sizes[k]):
             base[i] = -d[i] if d.shape[0] > 0 else 0.0
             if fits[k] == SCALED:
                 slope[i] = b[i]
             else:
                 base[i] += b[i]
-        row += sizes[k]
     for i in range(M):
         t = 0.0
         for k in range(n):
@@ -180,15 +172,13 @@ def _arrays(
                 t += C[i, k] * reference[k]
         B[0, n + i], B[1, n + i] = c_lower[i] - t, c_upper[i] - t
     row_norms(C, c_norm)
-    row = 0
     for k in range(sizes.shape[0]):
         if fits[k] == INTERVAL:
             continue
         size, largest = 0.0, 0.0
-        for i in range(row, row + sizes[k]):
+        for i in range(begin[k], begin[k] + sizes[k]):
             size = max(size, norm[i])
             largest = max(largest, abs(base[i]) + abs(slope[i]))
-        row += sizes[k]
         if size > 0.0:
             unit = max(unit, _COARSE * largest / size)
     c_norm[n + r] = unit
@@ -200,8 +190,7 @@ def _all_at_once(
     w: WorkingSet,
     q: Inequalities,
     e: Equations,
-    sizes: NDArray[np.int64],
-    natural: FloatArray,
+    levels: Levels,
     u: FloatArray,
     proofs: FloatArray,
 ) -> tuple[bool, int]:
@@ -209,24 +198,18 @@ def _all_at_once(
     for i in range(u.shape[0]):
         if q.B[0, i] == q.B[1, i]:
             return False, 0
-    begin = np.zeros(sizes.shape[0] + 1, np.int64)
-    for k in range(sizes.shape[0]):
-        begin[k + 1] = begin[k] + sizes[k]
-        size = task_size(e, begin[k], begin[k + 1], natural[k])
-        for i in range(begin[k], begin[k + 1]):
-            norm = e.norm[i]
-            if norm <= _DEPENDENT * size:
-                return False, i
-            for j in range(w.Q.shape[1]):
-                w.V[Z, j] = e.A[i, j] / norm
-            left = orthogonalise(w, 1.0)
-            if left * norm <= _DEPENDENT * size:
-                return False, i
+    for k in range(levels.sizes.shape[0]):
+        first, last = levels.begin[k], levels.begin[k] + levels.sizes[k]
+        size = task_size(e, first, last, levels.natural[k])
+        for i in range(first, last):
+            left, norm = take_apart(w, e, i, size), e.norm[i]
+            if not left > 0.0:
+                return False, w.K[NUM, 0]
             append(w, -1 - i, left, e.base[i] / norm, e.slope[i] / norm, 1.0)
     place(w, u)
     if most_violated(q, u) >= 0:
         return False, w.K[NUM, 0]
     if proofs.shape[1] > 0:
         combine(w, w.V[G], w.V[LAM])
-        write_multipliers(w, q, e.norm, proofs[sizes.shape[0]])
+        write_multipliers(w, q, e.norm, proofs[levels.sizes.shape[0]])
     return True, w.K[NUM, 0]

@@ -7,18 +7,16 @@ import numpy as np
 from cartctl.checks import FloatArray
 from cartctl.kernels import part
 from cartctl.solvers.exact.inequalities import OUT, Inequalities
-from cartctl.solvers.exact.working_set import WorkingSet
+from cartctl.solvers.exact.working_set import largest_entry
 
 _ALONG = 1e-12  # of the step: a component this small does not approach an inequality
 
 
 @part
-def blocked_at(q: Inequalities, w: WorkingSet, u: FloatArray, p: FloatArray) -> tuple[float, int]:
+def blocked_at(q: Inequalities, u: FloatArray, p: FloatArray) -> tuple[float, int]:
     """The largest share of step p that keeps every inequality, and the code of the one that ends it (-1: none)."""
     n = u.shape[0]
-    size = 0.0
-    for k in range(n):
-        size = max(size, abs(p[k]))
+    size = largest_entry(p)
     far, code = np.inf, -1
     for i in range(q.state.shape[0]):
         if q.state[i] != OUT:

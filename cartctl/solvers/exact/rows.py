@@ -5,9 +5,13 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
+
 from cartctl.checks import FloatArray
 from cartctl.kernels import part
 from cartctl.solvers.exact.inequalities import Inequalities
+from cartctl.solvers.exact.kinds import INTERVAL
 from cartctl.solvers.exact.proof import NOBODY, credit, write_proof
 from cartctl.solvers.exact.working_set import (
     C0,
@@ -42,6 +46,34 @@ class Equations(NamedTuple):
     slope: FloatArray  # (M,)
 
 
+class Levels(NamedTuple):
+    """What each level is, and its first row: of the equations, or of C for an interval level."""
+
+    sizes: NDArray[np.int64]  # (p,)
+    fits: NDArray[np.int64]  # (p,)
+    natural: FloatArray  # (p,) the norm a task has by nature
+    begin: NDArray[np.int64]  # (p,)
+    hard: int  # how many rows of C outrank every level; those of interval levels follow
+
+
+@part
+def level_table(sizes: NDArray[np.int64], fits: NDArray[np.int64], natural: FloatArray, rows: int) -> Levels:
+    """Where the levels' rows are; rows: how many C has."""
+    begin = np.empty(sizes.shape[0], np.int64)
+    hard = rows
+    for k in range(sizes.shape[0]):
+        if fits[k] == INTERVAL:
+            hard -= sizes[k]
+    row, soft = 0, hard
+    for k in range(sizes.shape[0]):
+        begin[k] = soft if fits[k] == INTERVAL else row
+        if fits[k] == INTERVAL:
+            soft += sizes[k]
+        else:
+            row += sizes[k]
+    return Levels(sizes, fits, natural, begin, hard)
+
+
 @part
 def task_size(e: Equations, first: int, last: int, natural: float) -> float:
     """The norm of a task's rows, or what it is by nature if that is more."""
@@ -52,16 +84,30 @@ def task_size(e: Equations, first: int, last: int, natural: float) -> float:
 
 
 @part
+def take_apart(w: WorkingSet, e: Equations, i: int, size: float) -> float:
+    """Make z the part of row i's unit normal orthogonal to the members, h its components; the norm of z.
+
+    0 where the row depends on the members, up to the noise in a task of norm ``size``, or is nothing but noise.
+    """
+    norm, z = e.norm[i], w.V[Z]
+    if norm <= _DEPENDENT * size:
+        for j in range(w.K[NUM, 0]):
+            w.V[H, j] = 0.0
+        return 0.0
+    for k in range(w.Q.shape[1]):
+        z[k] = e.A[i, k] / norm
+    left = orthogonalise(w, 1.0)
+    return left if left * norm > _DEPENDENT * size else 0.0
+
+
+@part
 def fix_rows(w: WorkingSet, e: Equations, first: int, last: int, size: float, u: FloatArray) -> None:
     """Make equalities of what rows first..last are at u; those that depend on the members say nothing new."""
     for i in range(first, last):
-        norm = e.norm[i]
-        if norm <= _DEPENDENT * size or w.K[NUM, 0] >= u.shape[0]:
-            continue
-        for k in range(u.shape[0]):
-            w.V[Z, k] = e.A[i, k] / norm
-        left = orthogonalise(w, 1.0)
-        if left * norm > _DEPENDENT * size:
+        if w.K[NUM, 0] >= u.shape[0]:
+            return
+        left = take_apart(w, e, i, size)
+        if left > 0.0:
             append_at(w, -1 - i, left, u)
 
 
@@ -79,21 +125,14 @@ def add_rows(
     for i in range(first, last):
         largest = max(largest, abs(e.slope[i]))
     for i in range(first, last):
-        norm = e.norm[i]
-        left = 0.0
-        if norm > _DEPENDENT * size:
-            for k in range(w.Q.shape[1]):
-                w.V[Z, k] = e.A[i, k] / norm
-            left = orthogonalise(w, 1.0)
-            if left * norm > _DEPENDENT * size and w.K[NUM, 0] < w.Q.shape[1]:
-                append(w, -1 - i, left, e.base[i] / norm, e.slope[i] / norm, s)
-                continue
-            combine(w, w.V[H], w.V[SUM])
-        else:
+        left, norm = take_apart(w, e, i, size), e.norm[i]
+        if left > 0.0 and w.K[NUM, 0] < w.Q.shape[1]:
+            append(w, -1 - i, left, e.base[i] / norm, e.slope[i] / norm, s)
+            continue
+        combine(w, w.V[H], w.V[SUM])
+        if norm <= _DEPENDENT * size:
             norm = size if size > 0.0 else 1.0
             e.norm[i] = norm  # a row of zeros is as large as its task
-            for j in range(w.K[NUM, 0]):
-                w.V[SUM, j] = 0.0
         lost = True
         at, bt = -e.base[i] / norm, e.slope[i] / norm
         at_size, bt_size = abs(at), max(abs(bt), largest / norm)

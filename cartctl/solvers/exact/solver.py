@@ -52,12 +52,7 @@ class ExactSolver(Solver):
 
     def _failed(self, problem: Problem) -> Solution:
         """FAILED, at the value inside the box that is nearest to zero."""
-        u = np.zeros(problem.n)
-        if problem.lower is not None:
-            u = np.maximum(u, problem.lower)
-        if problem.upper is not None:
-            u = np.minimum(u, problem.upper)
-        return Solution(problem, u, self.name, status=Status.FAILED)
+        return Solution(problem, problem.clip(np.zeros(problem.n)), self.name, status=Status.FAILED)
 
     def grade(self, solution: Solution) -> Status:
         """By what is skipped, by rank, by the scales, by what is asked for exactly."""

@@ -57,30 +57,33 @@ def orthogonalise(w: WorkingSet, norm: float) -> float:
     """Take the members' directions out of z (of the given norm), their components into h; the norm that is left."""
     Q, h, z, q = w.Q, w.V[H], w.V[Z], w.K[NUM, 0]
     n = Q.shape[1]
-    for i in range(q):
-        t = 0.0
-        for k in range(n):
-            t += Q[i, k] * z[k]
-        for k in range(n):
-            z[k] -= t * Q[i, k]
-        h[i] = t
     left = 0.0
-    for k in range(n):
-        left += z[k] * z[k]
-    left = math.sqrt(left)
-    if left >= _CANCELLED * norm:
-        return left
     for i in range(q):
-        t = 0.0
+        h[i] = 0.0
+    for _ in range(2):
+        for i in range(q):
+            t = 0.0
+            for k in range(n):
+                t += Q[i, k] * z[k]
+            for k in range(n):
+                z[k] -= t * Q[i, k]
+            h[i] += t
+        left = 0.0
         for k in range(n):
-            t += Q[i, k] * z[k]
-        for k in range(n):
-            z[k] -= t * Q[i, k]
-        h[i] += t
-    left = 0.0
-    for k in range(n):
-        left += z[k] * z[k]
-    return math.sqrt(left)
+            left += z[k] * z[k]
+        left = math.sqrt(left)
+        if left >= _CANCELLED * norm:
+            break
+    return left
+
+
+@part
+def largest_entry(u: FloatArray) -> float:
+    """``max |u_k|``."""
+    largest = 0.0
+    for k in range(u.shape[0]):
+        largest = max(largest, abs(u[k]))
+    return largest
 
 
 @part
