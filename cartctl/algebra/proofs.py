@@ -62,6 +62,7 @@ def check_proofs(
     x, low, high, span = np.empty(M + n + r), np.empty(M + n + r), np.empty(M + n + r), np.ones(M + n + r)
     given = np.zeros(M + n + r)
     level = np.empty(M + n + r, np.int64)
+    holder = np.full(M + n + r, p)  # the first level whose proof needs a row
     rows = (A, b, d, sizes, fits, natural, lower, upper, C, c_lower, c_upper)
     size = _rows(*rows, u, reach, scales, x, low, high, span, level)
     for i in range(M):
@@ -76,9 +77,12 @@ def check_proofs(
             for i in range(M + n + r):
                 if level[i] == k:
                     own[i] -= min(x[i] - low[i], 0.0) + max(x[i] - high[i], 0.0)
+        if k < p and scales[k] == scales[k]:
+            weight = _weight(x, low, high, span, level, k, size) if fits[k] != SCALED else 0.0
+            _hold(own, holder, k, span, weight)
         for j in range(k - 1, -1, -1):
             if scales[j] == scales[j]:
-                _turn(own, z[j], x, low, high, level, j, span)
+                _turn(own, z[j], x, low, high, level, holder, j, span)
         rest, terms = _stationarity(A, C, own, span, n, force, k == p)
         slack, value, slope, total = _value(own, x, low, high, level, b, k, span)
         if k == p:
@@ -185,14 +189,14 @@ def _turn(
     low: FloatArray,
     high: FloatArray,
     level: NDArray[np.int64],
+    holder: NDArray[np.int64],
     j: int,
     span: FloatArray,
 ) -> None:
-    """Add so much of what cancels at level j that the inequalities in it have the sign of the bound they are at."""
-    share = 0.0
-    most, most_earlier = _largest(own, span), _largest(earlier, span)
+    """Add so much of what cancels at level j that the inequalities it holds have the sign of the bound they are at."""
+    share, most = 0.0, _largest(own, span)
     for i in range(x.shape[0]):
-        if abs(earlier[i]) * span[i] <= _NOISE * most_earlier or abs(own[i]) * span[i] <= _NOISE * most:
+        if holder[i] != j or abs(own[i]) * span[i] <= _NOISE * most:
             continue
         if _equality(level[i], j, x[i], low[i], high[i]):
             continue
@@ -202,6 +206,15 @@ def _turn(
     if share > 0.0:
         for i in range(x.shape[0]):
             own[i] += share * earlier[i]
+
+
+@part
+def _hold(own: FloatArray, holder: NDArray[np.int64], k: int, span: FloatArray, weight: float) -> None:
+    """Level k holds what its proof needs, by more than round-off, and no level above it does."""
+    most = max(_largest(own, span), weight)
+    for i in range(own.shape[0]):
+        if holder[i] > k and abs(own[i]) * span[i] > _NOISE * most:
+            holder[i] = k
 
 
 @part

@@ -84,7 +84,7 @@ def by_levels(
         else:
             load(w, q, start, 1.0)
             settled = False
-            code = settle(w, q, u, 1.0, most)
+            code = settle(w, q, u, 1.0, 0.0, most)
             if code != SETTLED:
                 outcome, lost = (SKIPPED if code >= 0 else STALLED), False
             elif fits[k] == FITTED:
@@ -106,7 +106,7 @@ def by_levels(
             copy_members(saved, w)
             for i in range(q.state.shape[0]):
                 q.state[i] = states[i]
-            if not feasible and settle(w, q, u, 1.0, most) != SETTLED:
+            if not feasible and settle(w, q, u, 1.0, 0.0, most) != SETTLED:
                 return CONTRADICTORY
             feasible = True
             scales[k] = math.nan
@@ -117,7 +117,7 @@ def by_levels(
     if not settled:
         drop_all_free(q, w)
         load(w, q, start, 1.0)
-        code = settle(w, q, u, 1.0, most)
+        code = settle(w, q, u, 1.0, 0.0, most)
         if code != SETTLED and not feasible:
             return CONTRADICTORY
         if code != SETTLED:

@@ -17,6 +17,7 @@ from cartctl.solvers.exact.inequalities import (
     TOUCHED,
     Inequalities,
     drop,
+    look_again,
     most_violated,
     normal_of,
     right_side,
@@ -53,15 +54,18 @@ _LEAST = 1e-3  # coefficients below this are not what others are compared with
 
 
 @part
-def settle(w: WorkingSet, q: Inequalities, u: FloatArray, s: float, most: int) -> int:
-    """Make u the point of least norm on the members within all inequalities; SETTLED, STALLED or a code."""
+def settle(w: WorkingSet, q: Inequalities, u: FloatArray, s: float, blur: float, most: int) -> int:
+    """Make u the point of least norm on the members within all inequalities; SETTLED, STALLED or a code.
+
+    blur: by how much s is open to round-off, where something pins it.
+    """
     shed_negative(w, q)
     for _ in range(most):
         place(w, u)
         code = most_violated(q, u)
         if code < 0:
             return SETTLED
-        outcome = _bring_in(w, q, code, u, s, most)
+        outcome = _bring_in(w, q, code, u, s, blur, most)
         if outcome != SETTLED:
             return outcome
     return STALLED
@@ -131,20 +135,25 @@ def _first_in_the_way(w: WorkingSet, floor: float) -> tuple[int, float]:
 
 
 @part
-def _touches(w: WorkingSet, side: float, u: FloatArray, s: float) -> bool:
+def _touches(w: WorkingSet, side: float, u: FloatArray, s: float, blur: float) -> bool:
     """Whether the newcomer, a combination of the members, contradicts them by no more than round-off in their sum."""
     missing, total, size = side, 0.0, max(abs(side), largest_entry(u))
+    follows = 0.0  # how the combination of the members goes with s
     settled = True  # by levels above alone: it was met there, before their members were exchanged
     for j in range(w.K[NUM, 0]):
         missing -= w.V[SUM, j] * (w.V[C0, j] + s * w.V[C1, j])
         total += abs(w.V[SUM, j]) * max(abs(w.V[C0, j]), abs(s * w.V[C1, j]), size)
+        follows += w.V[SUM, j] * w.V[C1, j]
         if (w.K[KIND, j] != FIXED or w.V[C1, j] != 0.0) and abs(w.V[SUM, j]) > DEPENDENT:
             settled = False
-    return missing <= (_TOUCHED * size if settled else min(_SUMMED * total, _TOUCHED * size))
+    round_off = _TOUCHED * size if settled else min(_SUMMED * total, _TOUCHED * size)
+    return missing <= max(round_off, blur * abs(follows))
 
 
 @part
-def _bring_in(w: WorkingSet, q: Inequalities, code: int, u: FloatArray, s: float, most: int) -> int:
+def _bring_in(
+    w: WorkingSet, q: Inequalities, code: int, u: FloatArray, s: float, blur: float, most: int
+) -> int:
     """Make the violated inequality a member, dropping those in its way."""
     side = right_side(q, code)
     n = w.Q.shape[1]
@@ -157,7 +166,7 @@ def _bring_in(w: WorkingSet, q: Inequalities, code: int, u: FloatArray, s: float
         dependent = w.K[NUM, 0] >= n or left < independence(w)
         if dependent:
             if blocking < 0:
-                if _touches(w, side, u, s):
+                if _touches(w, side, u, s, blur):
                     q.state[code >> 1] = TOUCHED
                     return SETTLED
                 return code
@@ -177,4 +186,5 @@ def _bring_in(w: WorkingSet, q: Inequalities, code: int, u: FloatArray, s: float
         for j in range(w.K[NUM, 0]):
             w.V[LAM, j] -= first * w.V[SUM, j]
         drop(q, w, blocking)
+        look_again(q, w)
     return STALLED

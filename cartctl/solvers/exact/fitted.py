@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from cartctl.checks import FloatArray
 from cartctl.kernels import part
 from cartctl.solvers.exact.descent import STALLED, most_negative
-from cartctl.solvers.exact.inequalities import Inequalities, drop, normal_of, take_in
+from cartctl.solvers.exact.inequalities import Inequalities, drop, look_again, normal_of, take_in
 from cartctl.solvers.exact.line_search import blocked_at, lowest_at
 from cartctl.solvers.exact.proof import write_multipliers
 from cartctl.solvers.exact.scaled import MET
@@ -26,6 +26,7 @@ from cartctl.solvers.exact.working_set import (
     KIND,
     LAM,
     NUM,
+    SUM,
     WHO,
     H,
     WorkingSet,
@@ -33,12 +34,15 @@ from cartctl.solvers.exact.working_set import (
     combine,
     largest_entry,
     orthogonalise,
+    unsure,
 )
 
 _NOISE = 2e-8  # of the rows' size: singular values below this lead nowhere
 _REST = 1e-11  # of the largest miss: a step that changes the rows by less is none
 _ROUND_OFF = 1e-14  # of the rows' size times that of u: rows that move or miss by less do not
 _NOTHING = 1e-12  # of what is added up in a row, or may have been: a miss below this is none
+_SURE = 1e3  # times the round-off in it: a multiplier this large is one
+_MAGNIFIED = 1e9  # times round-off: no multiplier this large is due to it
 _PULLS = 1e-9  # of the rows' size times the largest miss: a multiplier below this is none
 
 
@@ -81,13 +85,20 @@ def fitted_level(
                 stays[code >> 1] |= code == gone[0]
             gone[0] = -1
             continue
+        if blocked_at(q, u, p)[0] >= 1.0:  # what is left of the way, so that the gradient is as exact as u
+            for k in range(n):
+                u[k] += p[k]
+            _misses(rows, low, high, u, miss)
+            largest = _largest(rows, u, float(q.norm[q.state.shape[0]]), miss)
         _slope(rows, miss, gradient)
         weakest = _multipliers(w, gradient, size * max(_PULLS * largest, round_off), stays)
         if weakest < 0:
             write_multipliers(w, q, norm, proof)
+            _keep_sure(w, _SURE * size * (round_off + size * unsure(w, u)))
             return MET, lost
         gone[0] = w.K[WHO, weakest]
         drop(q, w, weakest)
+        look_again(q, w)
     return STALLED, lost
 
 
@@ -194,7 +205,26 @@ def _multipliers(w: WorkingSet, gradient: FloatArray, nothing: float, stays: NDA
     orthogonalise(w, np.inf)
     combine(w, w.V[H], w.V[LAM])
     for j in range(w.K[NUM, 0]):
-        unsure = w.V[LAM, j] < 0.0 and w.K[WHO, j] >= 0 and w.K[KIND, j] == FREE and stays[w.K[WHO, j] >> 1]
-        if unsure or abs(w.V[LAM, j]) <= nothing:
+        returned = w.V[LAM, j] < 0.0 and w.K[KIND, j] == FREE and stays[w.K[WHO, j] >> 1]
+        if returned or abs(w.V[LAM, j]) <= nothing:
             w.V[LAM, j] = 0.0
     return most_negative(w)
+
+
+@part
+def _keep_sure(w: WorkingSet, round_off: float) -> None:
+    """Forget multipliers that an error along Q may account for: column j of R^-1 magnifies it."""
+    R, x, q = w.R, w.V[SUM], w.K[NUM, 0]
+    for j in range(q):
+        share = w.V[LAM, j]
+        if w.K[KIND, j] != FREE or share > _MAGNIFIED * round_off:
+            continue
+        total = 0.0
+        for i in range(j, q):
+            t = 1.0 if i == j else 0.0
+            for k in range(j, i):
+                t -= R[i, k] * x[k]
+            x[i] = t / R[i, i]
+            total += x[i] * x[i]
+        if share <= round_off * math.sqrt(total):
+            w.V[LAM, j] = 0.0

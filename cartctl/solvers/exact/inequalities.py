@@ -31,6 +31,7 @@ from cartctl.solvers.exact.working_set import (
 # Not in the set; in it; met with it; an equality; not yet in force; met with it up to round-off.
 OUT, MEMBER, IMPLIED, EQUAL, SILENT, TOUCHED = 0, 1, 2, 3, 4, 5
 
+_INDEPENDENT = 1e-9  # of a unit normal: what is left of one that was met with a member that has left
 _MET = 1e-12  # relative: an inequality missed by less is met
 
 
@@ -119,6 +120,14 @@ def forget_touched(q: Inequalities) -> None:
     """The members have changed: what was met with the former ones is looked at again."""
     for i in range(q.state.shape[0]):
         if q.state[i] == TOUCHED:
+            q.state[i] = OUT
+
+
+@part
+def look_again(q: Inequalities, w: WorkingSet) -> None:
+    """A member has left: what was met with it, and no longer depends on the members, is looked at again."""
+    for i in range(q.state.shape[0]):
+        if q.state[i] == TOUCHED and normal_of(q, 2 * i, w) > _INDEPENDENT:
             q.state[i] = OUT
 
 

@@ -34,6 +34,7 @@ from cartctl.solvers.exact.working_set import (
 END = 1e-9  # s this far outside [0, 1] is round-off
 _DEPENDENT = 2e-8  # of the task's own size: what is left of a row is noise
 _ROUND_OFF = 1e-12  # of s, or of the size of u
+_BLUR = 2e-15  # of the largest term of a row that pins s: its round-off
 _SAME = 1e-8  # relative: sides that differ by less agree
 
 
@@ -114,13 +115,15 @@ def fix_rows(w: WorkingSet, e: Equations, first: int, last: int, size: float, u:
 @part
 def add_rows(
     w: WorkingSet, q: Inequalities, e: Equations, first: int, last: int, size: float, proof: FloatArray
-) -> tuple[bool, float, int, bool]:
-    """Add rows first..last of one task of norm ``size``: possible, s, the row that pins s (or NOBODY), rank lost.
+) -> tuple[bool, float, float, int, bool]:
+    """Add rows first..last of one task of norm ``size``: possible, s, its blur, the row that pins s, rank lost.
+
+    The row is NOBODY where none pins s. The blur is what round-off in that row may have changed s by.
 
     A row that depends on the members, ``n_i = sum_j r_j n_j``, reads ``s bt = at``: nothing where both are zero, no s
     where only bt is; else s is pinned.
     """
-    s, pin, lost = 1.0, NOBODY, False
+    s, blur, pin, lost = 1.0, 0.0, NOBODY, False
     largest = 0.0
     for i in range(first, last):
         largest = max(largest, abs(e.slope[i]))
@@ -145,7 +148,7 @@ def add_rows(
             if abs(at) <= max(_SAME * max(at_size, bt_size), _ROUND_OFF * q.norm[q.state.shape[0]]):
                 continue
             _prove_row(w, q, e, i, pin, at, bt, proof)
-            return False, math.nan, pin, lost
+            return False, math.nan, 0.0, pin, lost
         pinned = at / bt
         if pinned < 0.0 and abs(at) <= _SAME * at_size:
             pinned = 0.0
@@ -153,13 +156,14 @@ def add_rows(
             pinned = 1.0
         if pinned < -END or pinned > 1.0 + END or (pin != NOBODY and abs(pinned - s) > _SAME):
             _prove_row(w, q, e, i, pin, at, bt, proof)
-            return False, math.nan, pin, lost
+            return False, math.nan, 0.0, pin, lost
         if pin == NOBODY:
             pin, s = -1 - i, max(0.0, pinned) if pinned < 1.0 - _ROUND_OFF else 1.0
+            blur = min(_BLUR * max(at_size, bt_size) / abs(bt), _SAME)
             for j in range(w.K[NUM, 0]):
                 w.V[Y, j] = -w.V[SUM, j]
             refill(w, s)
-    return True, s, pin, lost
+    return True, s, blur, pin, lost
 
 
 @part

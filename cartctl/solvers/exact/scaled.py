@@ -71,14 +71,14 @@ def scaled_level(
     most: int,
 ) -> tuple[int, float, bool]:
     """Rows first..last, the first ``members`` of which are in the set already: outcome, s, whether rank was lost."""
-    possible, s, implied, lost = add_rows(w, q, e, first + members, last, size, proof)
+    possible, s, blur, implied, lost = add_rows(w, q, e, first + members, last, size, proof)
     if not possible:
         return SKIPPED, math.nan, lost
     pinned = implied != NOBODY
     load(w, q, start, s)
     code = STALLED
     for _ in range(most):
-        code = settle(w, q, u, s, most)
+        code = settle(w, q, u, s, blur, most)
         if code < 0:
             break
         if pinned:

@@ -135,6 +135,15 @@ def noise(w: WorkingSet) -> float:
 
 
 @part
+def unsure(w: WorkingSet, u: FloatArray) -> float:
+    """By how much round-off in the members may have moved u, which is on them."""
+    worst = 0.0
+    for i in range(w.K[NUM, 0]):
+        worst = max(worst, w.V[ERR, i])
+    return worst * largest_entry(u)
+
+
+@part
 def remove(w: WorkingSet, k: int) -> None:
     """Take out member k; the later ones move up."""
     q, n = w.K[NUM, 0], w.Q.shape[1]
