@@ -24,7 +24,9 @@ PRIMAL, DUAL, GAP = 0, 1, 2
 _NOISE = 1e-12  # of the largest multiplier
 _CLEAR = 1e-14  # of the terms of h: a sum this small has no sign
 _MISSED = 1e-10  # relative: an interval missed by less is met
-_COARSE = 1e-4  # of a level's rows, or of u and u0: misses and steps below this are judged as if they were this large
+_GROUND = 1e-8  # of the largest bound: a u smaller than this is judged as if it were this large
+_COARSE = 1e-4  # of u and u0: steps below this are judged as if they were this large
+_MET = 1e-3  # of the rows of a fitted level: misses below this, too
 
 
 @kernel(
@@ -64,6 +66,9 @@ def check_proofs(
     level = np.empty(M + n + r, np.int64)
     holder = np.full(M + n + r, p)  # the first level whose proof needs a row
     rows = (A, b, d, sizes, fits, natural, lower, upper, C, c_lower, c_upper)
+    ground = _GROUND * max(_farthest(lower), _farthest(upper))
+    if 0.0 < reach < ground:
+        pull, reach = pull * ground / reach, ground
     size = _rows(*rows, u, reach, scales, x, low, high, span, level)
     for i in range(M):
         given[i] = abs(b[i]) + (abs(d[i]) if d.shape[0] > 0 else 0.0)
@@ -88,7 +93,7 @@ def check_proofs(
         if k == p:
             terms = max(terms, _COARSE * pull)
         elif fits[k] != SCALED:
-            terms = max(terms, _COARSE * _weight(x, low, high, span, level, k, size))
+            terms = max(terms, _MET * _weight(x, low, high, span, level, k, size))
         residuals[k, DUAL] = rest / terms if terms > 0.0 else 0.0
         residuals[k, PRIMAL] = 0.0  # a fitted or skipped level promises nothing of its own rows
         if k == p or (fits[k] == SCALED and scales[k] == scales[k]):
@@ -102,6 +107,16 @@ def check_proofs(
             residuals[k, GAP] = 0.0 if margin > _CLEAR * total else 1.0
         elif scales[k] < 1.0:
             residuals[k, GAP] = abs(value) / slope if slope > 0.0 else np.inf
+
+
+@part
+def _farthest(bounds: FloatArray) -> float:
+    """The largest finite bound."""
+    largest = 0.0
+    for i in range(bounds.shape[0]):
+        if abs(bounds[i]) < np.inf:
+            largest = max(largest, abs(bounds[i]))
+    return largest
 
 
 @part

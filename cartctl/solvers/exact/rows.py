@@ -27,6 +27,7 @@ from cartctl.solvers.exact.working_set import (
     append,
     append_at,
     combine,
+    noise,
     orthogonalise,
     refill,
 )
@@ -159,7 +160,7 @@ def add_rows(
             return False, math.nan, 0.0, pin, lost
         if pin == NOBODY:
             pin, s = -1 - i, max(0.0, pinned) if pinned < 1.0 - _ROUND_OFF else 1.0
-            blur = min(_BLUR * max(at_size, bt_size) / abs(bt), _SAME)
+            blur = min((_BLUR + noise(w)) * max(at_size, bt_size) / abs(bt), _SAME)
             for j in range(w.K[NUM, 0]):
                 w.V[Y, j] = -w.V[SUM, j]
             refill(w, s)
