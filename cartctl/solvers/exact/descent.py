@@ -44,12 +44,14 @@ from cartctl.solvers.exact.working_set import (
 
 SETTLED, STALLED = -1, -2  # else the code of the inequality that cannot be met at this scale
 
+_EPS = 2.0**-52
 DEPENDENT = 1e-11  # of a unit normal: what is left of it is round-off
 _SURELY = 30.0  # times what round-off may leave
 SMALL = 1e-11  # of the largest coefficient of a combination
 _CLEARLY = 1e-6  # of a unit normal: a guess that adds less is left out
 _SUMMED = 1e-12  # of the terms of a sum: round-off
 _TOUCHED = 1e-9  # of the size of u: and in no case more than this
+_BLURRED = 1e-7  # of the size of u: and no more than this where rows that nearly depend on each other magnify it
 _LEAST = 1e-3  # coefficients below this are not what others are compared with
 
 
@@ -147,7 +149,8 @@ def _touches(w: WorkingSet, side: float, u: FloatArray, s: float, blur: float) -
         if (w.K[KIND, j] != FIXED or w.V[C1, j] != 0.0) and abs(w.V[SUM, j]) > DEPENDENT:
             settled = False
     round_off = _TOUCHED * size if settled else min(_SUMMED * total, _TOUCHED * size)
-    return missing <= max(round_off, blur * abs(follows))
+    magnified = max(blur * abs(follows), _SURELY * _EPS * total)
+    return missing <= max(round_off, min(magnified, _BLURRED * size))
 
 
 @part

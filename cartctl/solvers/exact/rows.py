@@ -27,6 +27,7 @@ from cartctl.solvers.exact.working_set import (
     append,
     append_at,
     combine,
+    length,
     noise,
     orthogonalise,
     refill,
@@ -89,10 +90,13 @@ def task_size(e: Equations, first: int, last: int, natural: float) -> float:
 def take_apart(w: WorkingSet, e: Equations, i: int, size: float) -> float:
     """Make z the part of row i's unit normal orthogonal to the members, h its components; the norm of z.
 
-    0 where the row depends on the members, up to the noise in a task of norm ``size``, or is nothing but noise.
+    0 where the row depends on the members, up to the noise in a task of norm ``size`` (z is what is neglected), or is
+    nothing but noise.
     """
     norm, z = e.norm[i], w.V[Z]
     if norm <= _DEPENDENT * size:
+        for k in range(w.Q.shape[1]):
+            z[k] = 0.0
         for j in range(w.K[NUM, 0]):
             w.V[H, j] = 0.0
         return 0.0
@@ -133,8 +137,10 @@ def add_rows(
         if left > 0.0 and w.K[NUM, 0] < w.Q.shape[1]:
             append(w, -1 - i, left, e.base[i] / norm, e.slope[i] / norm, s)
             continue
+        neglected, part_of = length(w.V[Z], w.Q.shape[1]), 1.0
         combine(w, w.V[H], w.V[SUM])
         if norm <= _DEPENDENT * size:
+            part_of = norm / size if size > 0.0 else 0.0
             norm = size if size > 0.0 else 1.0
             e.norm[i] = norm  # a row of zeros is as large as its task
         lost = True
@@ -143,7 +149,7 @@ def add_rows(
         for j in range(w.K[NUM, 0]):
             at += w.V[SUM, j] * w.V[C0, j]
             bt -= w.V[SUM, j] * w.V[C1, j]
-            at_size = max(at_size, abs(w.V[SUM, j] * w.V[C0, j]), abs(w.V[G, j]))
+            at_size = max(at_size, abs(w.V[SUM, j] * w.V[C0, j]), part_of * abs(w.V[G, j]))
             bt_size = max(bt_size, abs(w.V[SUM, j] * w.V[C1, j]))
         if abs(bt) <= _SAME * bt_size:
             if abs(at) <= max(_SAME * max(at_size, bt_size), _ROUND_OFF * q.norm[q.state.shape[0]]):
@@ -160,7 +166,7 @@ def add_rows(
             return False, math.nan, 0.0, pin, lost
         if pin == NOBODY:
             pin, s = -1 - i, max(0.0, pinned) if pinned < 1.0 - _ROUND_OFF else 1.0
-            blur = min((_BLUR + noise(w)) * max(at_size, bt_size) / abs(bt), _SAME)
+            blur = min((_BLUR + noise(w) + part_of * neglected) * max(at_size, bt_size) / abs(bt), _SAME)
             for j in range(w.K[NUM, 0]):
                 w.V[Y, j] = -w.V[SUM, j]
             refill(w, s)

@@ -68,13 +68,19 @@ def orthogonalise(w: WorkingSet, norm: float) -> float:
             for k in range(n):
                 z[k] -= t * Q[i, k]
             h[i] += t
-        left = 0.0
-        for k in range(n):
-            left += z[k] * z[k]
-        left = math.sqrt(left)
+        left = length(z, n)
         if left >= _CANCELLED * norm:
             break
     return left
+
+
+@part
+def length(z: FloatArray, n: int) -> float:
+    """``||z[:n]||``."""
+    total = 0.0
+    for k in range(n):
+        total += z[k] * z[k]
+    return math.sqrt(total)
 
 
 @part
