@@ -38,6 +38,7 @@ _DEPENDENT = 2e-8  # of the task's own size: what is left of a row is noise
 _ROUND_OFF = 1e-12  # of s, or of the size of u
 _BLUR = 2e-15  # of the largest term of a row that pins s: its round-off
 _SAME = 1e-8  # relative: sides that differ by less agree
+_NEGLECTED = 3.0  # times what is neglected of a row: or by less than this
 
 
 class Equations(NamedTuple):
@@ -144,6 +145,7 @@ def add_rows(
             norm = size if size > 0.0 else 1.0
             e.norm[i] = norm  # a row of zeros is as large as its task
         lost = True
+        same = max(_SAME, _NEGLECTED * part_of * neglected)
         at, bt = -e.base[i] / norm, e.slope[i] / norm
         at_size, bt_size = abs(at), max(abs(bt), largest / norm)
         for j in range(w.K[NUM, 0]):
@@ -151,22 +153,22 @@ def add_rows(
             bt -= w.V[SUM, j] * w.V[C1, j]
             at_size = max(at_size, abs(w.V[SUM, j] * w.V[C0, j]), part_of * abs(w.V[G, j]))
             bt_size = max(bt_size, abs(w.V[SUM, j] * w.V[C1, j]))
-        if abs(bt) <= _SAME * bt_size:
-            if abs(at) <= max(_SAME * max(at_size, bt_size), _ROUND_OFF * q.norm[q.state.shape[0]]):
+        if abs(bt) <= same * bt_size:
+            if abs(at) <= max(same * max(at_size, bt_size), _ROUND_OFF * q.norm[q.state.shape[0]]):
                 continue
             _prove_row(w, q, e, i, pin, at, bt, proof)
             return False, math.nan, 0.0, pin, lost
         pinned = at / bt
-        if pinned < 0.0 and abs(at) <= _SAME * at_size:
+        if pinned < 0.0 and abs(at) <= same * at_size:
             pinned = 0.0
-        elif pinned > 1.0 and abs(at - bt) <= _SAME * max(at_size, bt_size):
+        elif pinned > 1.0 and abs(at - bt) <= same * max(at_size, bt_size):
             pinned = 1.0
-        if pinned < -END or pinned > 1.0 + END or (pin != NOBODY and abs(pinned - s) > _SAME):
+        if pinned < -END or pinned > 1.0 + END or (pin != NOBODY and abs(pinned - s) > same):
             _prove_row(w, q, e, i, pin, at, bt, proof)
             return False, math.nan, 0.0, pin, lost
         if pin == NOBODY:
             pin, s = -1 - i, max(0.0, pinned) if pinned < 1.0 - _ROUND_OFF else 1.0
-            blur = min((_BLUR + noise(w) + part_of * neglected) * max(at_size, bt_size) / abs(bt), _SAME)
+            blur = min((_BLUR + noise(w) + part_of * neglected) * max(at_size, bt_size) / abs(bt), same)
             for j in range(w.K[NUM, 0]):
                 w.V[Y, j] = -w.V[SUM, j]
             refill(w, s)
