@@ -175,5 +175,8 @@ def test_every_public_name_resolves_and_unknown_ones_do_not():
         value = getattr(cartctl, name)
         assert name == "__version__" or callable(value), f"cc.{name} is {value!r}"
         assert name in dir(cartctl)
+    for name in cartctl._MODULES:
+        assert getattr(cartctl, name).__name__ == f"cartctl.{name}"
+        assert all(hasattr(getattr(cartctl, name), inner) for inner in getattr(cartctl, name).__all__)
     with pytest.raises(AttributeError, match="no_such_name"):
         cartctl.no_such_name  # noqa: B018
