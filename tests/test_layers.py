@@ -33,6 +33,7 @@ MAY_IMPORT = {
     "constraints": ROBOT | {"algebra"},
     "objectives": ROBOT | {"algebra"},
     "analysis": ROBOT | {"algebra", "tasks"},
+    "statics": GROUND | {"spatial", "algebra"},
     "levels": JOINED - {"levels"},
     "files": {"errors"},
     "motion": JOINED | {"files"},
@@ -160,7 +161,7 @@ def test_solvers_work_without_pinocchio():
         "    p = cc.Problem([([[1.0, 2.0], [3.0, -1.0]], [1.0, 2.0])])\n"
         "    s = cc.solve(p, name)\n"
         "    assert s.residuals[0] < 3.0 and s.status\n"
-        "import cartctl.spatial\n"
+        "import cartctl.spatial, cartctl.statics\n"
     )
 
 

@@ -20,7 +20,8 @@ from cartctl import SNS, Equation, Inequality, Problem, Solution, Status, solve
 from cartctl.errors import UnsupportedProblem
 from tests import oracles, prioritised
 from tests import tolerances as tol
-from tests.test_worked_examples import ITEMS, planar_drift, real
+from tests.test_worked_examples import planar_drift
+from tests.worked_examples import ITEMS, real
 
 CASES = json.loads((Path(__file__).parent / "data/sns_cases.json").read_text())["cases"]
 PROVEN = 1e-7  # of a certificate

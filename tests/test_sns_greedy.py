@@ -16,7 +16,8 @@ from cartctl import Equation, Problem, SNSGreedy, Status, solve
 from cartctl.errors import ParameterError
 from tests import oracles
 from tests import tolerances as tol
-from tests.test_worked_examples import ITEMS, planar_drift, real
+from tests.test_worked_examples import planar_drift
+from tests.worked_examples import ITEMS, real
 
 CASES = json.loads((Path(__file__).parent / "data/sns_cases.json").read_text())["cases"]
 INSIDE = 1e-10
