@@ -257,6 +257,8 @@ def test_the_printed_matrix_of_zyz():
         (lambda: spatial.euler_angles("XYZ", np.eye(3), about=None), "about is None"),
         (lambda: spatial.euler_rates("XYZ", np.zeros(3), axes="tool"), "'base', 'body'"),
         (lambda: spatial.euler_lock("xyz", np.zeros(3)), "sequence is 'xyz'"),
+        (lambda: spatial.euler_angles("XYZ", np.zeros((3, 3))), "expected a rotation matrix"),
+        (lambda: spatial.log3(np.ones((3, 3))), "expected a rotation matrix"),
         (lambda: spatial.euler_lock("XYZ", np.zeros(3), "base"), "about is 'base'"),
     ],
 )

@@ -231,6 +231,15 @@ def test_the_capacity_in_every_direction(seed, shape, kind):
     assert min(found.highest, -found.lowest) == pytest.approx(size)
 
 
+@pytest.mark.parametrize("size", [1e-300, 1e300])
+def test_links_of_any_length(size):
+    """The wrenches scale against the Jacobian; nothing under- or overflows on the way."""
+    J, limit = size * np.eye(2), np.ones(2)
+    assert statics.wrench_capacity(J, -limit, limit).size == pytest.approx(1.0 / size)
+    assert statics.wrench_range(J, [1.0, 0.0], -limit, limit).highest == pytest.approx(1.0 / size)
+    np.testing.assert_allclose(statics.balanced_wrench(J, limit).wrench, 1.0 / size)
+
+
 def test_what_no_limit_stops_and_what_none_allows():
     J = oracles.planar_jacobian([1.0, 1.0], [0.3, 0.0])
     along, limit = np.array([math.cos(0.3), math.sin(0.3)]), np.array([10.0, 5.0])
@@ -351,11 +360,13 @@ def test_point_contacts_leave_a_twist_about_their_line():
         (lambda: statics.wrench_capacity(np.eye(2), -np.ones(3), np.ones(2)), ShapeError, "lower has shape (3,)"),
         (lambda: statics.ClosedChain([]), ShapeError, "jacobians is empty"),
         (lambda: statics.ClosedChain([np.eye(2), np.eye(3)]), ShapeError, "jacobians[1] has 3 rows"),
-        (lambda: statics.ClosedChain([np.eye(2)] * 2, [np.eye(2)]), ShapeError, "grasps has 1 entries"),
+        (lambda: statics.ClosedChain([np.eye(2)] * 2, [np.eye(2)]), ShapeError, "grasps has 1 entries; expected 2"),
         (lambda: statics.ClosedChain([np.eye(2)] * 2, [np.eye(2), np.eye(3)]), ShapeError, "grasps[1]"),
         (lambda: statics.ClosedChain([np.eye(2)] * 2).hold(np.zeros(3)), ShapeError, "load has shape (3,)"),
         (lambda: statics.ClosedChain([np.eye(2)] * 2).hold(squeeze=np.zeros(2)), ShapeError, "squeeze"),
         (lambda: statics.ClosedChain([np.eye(2)] * 2).contacts([np.zeros(2)]), ShapeError, "torques has 1"),
+        (lambda: statics.ClosedChain(None), ShapeError, "jacobians is None"),
+        (lambda: statics.ClosedChain([np.eye(2)], [[[1], [1, 2]]]), ShapeError, "grasps[0] is [[1], [1, 2]]"),
         (lambda: statics.ClosedChain([np.eye(2)] * 2).contacts([[0, 0], [0]]), ShapeError, "torques[1]"),
     ],
 )

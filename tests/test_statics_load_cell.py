@@ -139,7 +139,9 @@ def test_three_ways_down_are_enough_and_two_are_not():
         (lambda: statics.LoadCell().weight(2.0 * np.eye(3)), ParameterError, "expected a rotation matrix"),
         (lambda: statics.LoadCell().contact(np.zeros(3), np.eye(3)), ShapeError, "reading has shape (3,)"),
         (lambda: statics.fit_load_cell([], []), ParameterError, "0 orientations"),
-        (lambda: statics.fit_load_cell([np.eye(3)], []), ShapeError, "readings has 0 entries for 1"),
+        (lambda: statics.fit_load_cell([np.eye(3)], []), ShapeError, "readings has 0 entries; expected 1"),
+        (lambda: statics.fit_load_cell(None, []), ShapeError, "rotations is None"),
+        (lambda: statics.fit_load_cell([np.zeros((3, 3))], np.zeros((1, 6))), ParameterError, "rotations[0]"),
         (lambda: statics.fit_load_cell(WAYS, np.zeros((3, 6))), ParameterError, "mass of 0 kg"),
     ],
 )

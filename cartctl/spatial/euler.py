@@ -18,6 +18,7 @@ from scipy.spatial.transform import Rotation
 
 from cartctl import checks
 from cartctl.checks import FloatArray
+from cartctl.errors import ParameterError
 from cartctl.spatial.rotations import cross
 
 EULER_SEQUENCES = tuple("".join(s) for s in product("XYZ", repeat=3) if s[0] != s[1] and s[1] != s[2])
@@ -59,7 +60,10 @@ def euler_angles(sequence: str, R: FloatArray, about: str = "moving") -> FloatAr
     R = checks.matrix("R", R, 3, 3)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # the lock is reported by euler_lock
-        return Rotation.from_matrix(R).as_euler(name)  # type: ignore[no-any-return]
+        try:
+            return Rotation.from_matrix(R).as_euler(name)  # type: ignore[no-any-return]
+        except ValueError:
+            raise ParameterError(f"R has the determinant {np.linalg.det(R):.3g}; expected a rotation matrix") from None
 
 
 def euler_rates(sequence: str, phi: Any, about: str = "moving", axes: str = "base") -> FloatArray:

@@ -19,10 +19,9 @@ import numpy as np
 from cartctl import checks
 from cartctl.checks import FloatArray
 from cartctl.errors import ParameterError, ShapeError
-from cartctl.spatial.rotations import skew
+from cartctl.spatial.rotations import checked_rotation, skew
 
 _ORDERS = ("linear-first", "angular-first")
-_ORTHONORMAL = 1e-6
 _LAST = np.array([0.0, 0.0, 0.0, 1.0])
 
 
@@ -46,7 +45,7 @@ def pose(R: Any = None, p: Any = None) -> FloatArray:
     """
     T = np.eye(4)
     if R is not None:
-        T[:3, :3] = _rotation("R", checks.matrix("R", R, 3, 3))
+        T[:3, :3] = checked_rotation("R", R)
     if p is not None:
         T[:3, 3] = checks.vector("p", p, 3)
     return T
@@ -112,27 +111,8 @@ def as_pose(name: str, value: Any) -> FloatArray:
     T = checks.matrix(name, getattr(value, "homogeneous", value), 4, 4)
     if not np.array_equal(T[3], _LAST):
         raise ParameterError(f"{name} has the last row {T[3]}; expected a pose with the last row 0 0 0 1")
-    _rotation(name, T[:3, :3])
+    checked_rotation(name, T[:3, :3])
     return T
-
-
-def off_rotation(R: FloatArray) -> float:
-    """By how much R (3, 3) misses ``R^T R = I``, entry by entry; at least 1 for a reflection."""
-    error = float(np.abs(R.T @ R - np.eye(3)).max())
-    return max(error, 1.0) if np.linalg.det(R) < 0.0 else error
-
-
-def is_rotation(R: FloatArray) -> bool:
-    """Whether R (3, 3) is a rotation up to 1e-6."""
-    return off_rotation(R) <= _ORTHONORMAL
-
-
-def _rotation(name: str, R: FloatArray) -> FloatArray:
-    if not is_rotation(R):
-        raise ParameterError(
-            f"{name}: its rotation is off R^T R = I, det R = 1 by {off_rotation(R):.2g}; expected a rotation matrix"
-        )
-    return R
 
 
 def _blocks(T: FloatArray, row: int) -> FloatArray:

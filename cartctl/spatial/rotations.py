@@ -9,9 +9,11 @@ import numpy as np
 
 from cartctl import checks
 from cartctl.checks import FloatArray
+from cartctl.errors import ParameterError
 from cartctl.spatial.pose_error import pose_error
 
 _ORIGIN, _EYE = np.zeros(3), np.eye(3)
+_ORTHONORMAL = 1e-6
 
 
 def skew(a: FloatArray) -> FloatArray:
@@ -45,10 +47,34 @@ def exp3(phi: Any) -> FloatArray:
 
 
 def log3(R: FloatArray) -> FloatArray:
-    """The angle-axis vector of a rotation R (3, 3), (3,), rad, of length at most pi; exact at 0 and at pi."""
+    """The angle-axis vector of a rotation R (3, 3), (3,), rad, of length at most pi; exact at 0 and at pi.
+
+    Raises ParameterError where R is no rotation, ShapeError, NonFiniteError.
+    """
     error = np.empty(6)
-    pose_error(_ORIGIN, _EYE, _ORIGIN, checks.matrix("R", R, 3, 3), error)
+    pose_error(_ORIGIN, _EYE, _ORIGIN, checked_rotation("R", R), error)
     return error[3:]
+
+
+def off_rotation(R: FloatArray) -> float:
+    """By how much R (3, 3) misses ``R^T R = I``, entry by entry; at least 1 for a reflection."""
+    error = float(np.abs(R.T @ R - np.eye(3)).max())
+    return max(error, 1.0) if np.linalg.det(R) < 0.0 else error
+
+
+def is_rotation(R: FloatArray) -> bool:
+    """Whether R (3, 3) is a rotation up to 1e-6."""
+    return off_rotation(R) <= _ORTHONORMAL
+
+
+def checked_rotation(name: str, value: Any) -> FloatArray:
+    """``value`` as a rotation (3, 3); raises ParameterError where it is none, ShapeError, NonFiniteError."""
+    R = checks.matrix(name, value, 3, 3)
+    if not is_rotation(R):
+        raise ParameterError(
+            f"{name}: its rotation is off R^T R = I, det R = 1 by {off_rotation(R):.2g}; expected a rotation matrix"
+        )
+    return R
 
 
 # sum_k (-1)^k x^2k / (2k + 3)!, highest power first: (x - sin x)/x^3 loses its digits near zero

@@ -88,6 +88,9 @@ def _screw(line: FloatArray, moment: FloatArray, farthest: float) -> Screw:
         return Screw(moment / length, np.zeros(3), math.inf, length)
     if size == 0.0:
         return Screw(np.zeros(3), np.zeros(3), 0.0, 0.0)
-    s, m = line / size, moment / size
+    largest = float(np.abs(line).max())  # so that subnormal numbers, too, have a direction
+    s = line / largest
+    s /= math.hypot(*s.tolist())
+    m = moment / size
     pitch = float(s @ m)
     return Screw(s, cross(s, m), pitch, size)

@@ -8,7 +8,7 @@ import numpy as np
 
 from cartctl import checks
 from cartctl.algebra.metric import Whitening, as_metric
-from cartctl.algebra.svd import ROUND_OFF, scale
+from cartctl.algebra.svd import ROUND_OFF, norm, scale
 from cartctl.checks import FloatArray
 from cartctl.errors import ParameterError
 
@@ -83,7 +83,7 @@ def wrench_capacity(J: Any, lower: Any, upper: Any, load: Any = None, metric: An
     room = np.minimum(upper - load, load - lower)
     if (room < 0.0).any():
         return Capacity(0.0, int(room.argmin()))
-    arms = np.linalg.norm(columns, axis=1)
+    arms = np.array([norm(np.ascontiguousarray(column)) for column in columns])
     felt = arms > ROUND_OFF * max(J.shape) * scale(columns)
     sizes = np.full(J.shape[1], np.inf)
     sizes[felt] = room[felt] / arms[felt]

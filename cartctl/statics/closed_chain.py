@@ -46,9 +46,10 @@ class ClosedChain:
     """
 
     def __init__(self, jacobians: Sequence[Any], grasps: Sequence[Any] | None = None) -> None:
-        if len(jacobians) == 0:
+        given = checks.listed("jacobians", jacobians)
+        if not given:
             raise ShapeError("jacobians is empty; expected one Jacobian (m_k, n_k) an arm")
-        self.jacobians = tuple(checks.matrix(f"jacobians[{k}]", J) for k, J in enumerate(jacobians))
+        self.jacobians = tuple(checks.matrix(f"jacobians[{k}]", J) for k, J in enumerate(given))
         if grasps is None:
             m = self.jacobians[0].shape[0]
             other = next((k for k, J in enumerate(self.jacobians) if J.shape[0] != m), None)
@@ -58,9 +59,8 @@ class ClosedChain:
                     "expected as many in all, or grasps"
                 )
             grasps = [np.eye(m)] * len(self.jacobians)
-        if len(grasps) != len(self.jacobians):
-            raise ShapeError(f"grasps has {len(grasps)} entries for {len(self.jacobians)} arms; expected as many")
-        rows = np.shape(grasps[0])[0] if np.ndim(grasps[0]) else None
+        grasps = checks.listed("grasps", grasps, len(self.jacobians))
+        rows = checks.matrix("grasps[0]", grasps[0]).shape[0]
         self.grasps = tuple(
             checks.matrix(f"grasps[{k}]", G, rows, J.shape[0])
             for k, (G, J) in enumerate(zip(grasps, self.jacobians, strict=True))
@@ -103,9 +103,7 @@ class ClosedChain:
         The torques handed back are those the wrenches stand for: the rest of the ones given sets the chain moving, as
         does ``unbalanced``. Statically indeterminate wrenches are the least. Raises ShapeError, NonFiniteError.
         """
-        if len(torques) != len(self.jacobians):
-            raise ShapeError(f"torques has {len(torques)} entries for {len(self.jacobians)} arms; expected as many")
-        arms = enumerate(zip(torques, self.jacobians, strict=True))
+        arms = enumerate(zip(checks.listed("torques", torques, len(self.jacobians)), self.jacobians, strict=True))
         given = [checks.vector(f"torques[{k}]", tau, J.shape[1]) for k, (tau, J) in arms]
         G = self.grasp
         load = np.zeros(G.shape[0]) if load is None else checks.vector("load", load, G.shape[0])

@@ -11,9 +11,10 @@ import numpy as np
 from cartctl import checks
 from cartctl.algebra.svd import numerical_rank, round_off, svd
 from cartctl.checks import FloatArray
-from cartctl.errors import ParameterError, ShapeError
-from cartctl.spatial import cross, move_wrench, pose, skew, wrench_adjoint
+from cartctl.errors import ParameterError
+from cartctl.spatial import cross, move_wrench, skew, wrench_adjoint
 from cartctl.spatial.frames import as_pose
+from cartctl.spatial.rotations import checked_rotation
 
 GRAVITY = (0.0, 0.0, -9.81)
 _NOTHING = 1e-9  # of the readings: no weight, and no centre of mass
@@ -51,7 +52,7 @@ class LoadCell:
         rotation: (3, 3), the cell's axes in the world. Raises ParameterError where it is no rotation, ShapeError,
         NonFiniteError.
         """
-        f = self.mass * (pose(rotation)[:3, :3].T @ self.gravity)
+        f = self.mass * (checked_rotation("rotation", rotation).T @ self.gravity)
         return np.concatenate([f, cross(self.com, f)])
 
     def contact(self, reading: Any, rotation: Any) -> FloatArray:
@@ -78,12 +79,10 @@ def fit_load_cell(
 
     Raises ParameterError where the orientations leave something open, ShapeError, NonFiniteError.
     """
-    if len(rotations) != len(readings):
-        raise ShapeError(f"readings has {len(readings)} entries for {len(rotations)} rotations; expected as many")
     g = checks.vector("gravity", gravity, 3)
-    R = [pose(r)[:3, :3] for r in rotations]
-    read = np.array([checks.vector(f"readings[{k}]", w, 6) for k, w in enumerate(readings)]).reshape(-1, 6)
-    downs = [r.T @ g for r in R]
+    downs = [checked_rotation(f"rotations[{k}]", R).T @ g for k, R in enumerate(checks.listed("rotations", rotations))]
+    given = enumerate(checks.listed("readings", readings, len(downs)))
+    read = np.array([checks.vector(f"readings[{k}]", w, 6) for k, w in given]).reshape(-1, 6)
     force, mass = np.eye(3), [np.column_stack([np.eye(3), d]) for d in downs]
     f = _least_squares(mass, 4, read[:, :3])
     moments = [np.hstack([force, -skew(d)]) for d in downs]

@@ -12,7 +12,7 @@ from cartctl import checks
 from cartctl.checks import FloatArray
 from cartctl.errors import TargetError
 from cartctl.paths import Path
-from cartctl.spatial.frames import is_rotation, off_rotation
+from cartctl.spatial.rotations import is_rotation, off_rotation
 
 
 class Goal:
