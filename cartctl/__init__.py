@@ -83,6 +83,7 @@ _HOMES = {
         "Waypoints",
     ),
 }
+_MODULES = ("analysis", "spatial", "statics")  # reached as cc.NAME; their names stay inside them
 _HOME_OF = {name: module for module, names in _HOMES.items() for name in names}
 
 __all__ = ["__version__", *sorted(_HOME_OF)]  # noqa: PLE0604 - names, from the table above
@@ -172,8 +173,8 @@ if TYPE_CHECKING:  # editors and mypy see what __getattr__ finds
 
 
 def __getattr__(name: str) -> Any:
-    if name == "analysis":
-        return import_module("cartctl.analysis")
+    if name in _MODULES:
+        return import_module(f"cartctl.{name}")
     if name not in _HOME_OF:
         raise AttributeError(f"module 'cartctl' has no attribute {name!r}")
     try:

@@ -79,6 +79,17 @@ def matrix(name: str, value: Any, rows: int | None = None, columns: int | None =
     return array
 
 
+def listed(name: str, value: Any, count: int | None = None) -> list[Any]:
+    """``value`` as a list of ``count`` things; raises ShapeError where it is none."""
+    try:
+        items = list(value)
+    except TypeError:
+        raise ShapeError(f"{name} is {_short(value)}; expected a list") from None
+    if count is not None and len(items) != count:
+        raise ShapeError(f"{name} has {len(items)} entries; expected {count}")
+    return items
+
+
 def number(name: str, value: Any, *, low: float = -math.inf, high: float = math.inf, strict: bool = False) -> float:
     """``value`` as a finite float inside [low, high], or above ``low`` if ``strict``.
 

@@ -16,7 +16,7 @@ from cartctl.motion.integrate import by_acceleration, by_velocity
 from tests import oracles
 from tests.robots_for_tests import ROBOTS, panda, planar, random_state
 from tests.test_simulate import circling
-from tests.test_worked_examples import ITEMS, real
+from tests.worked_examples import ITEMS, real
 
 
 def problem_of(level: cc.AccelerationLevel, state: cc.State, tasks: list[cc.Task], **secondary: object) -> cc.Problem:

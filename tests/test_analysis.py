@@ -26,7 +26,7 @@ from cartctl.errors import (
 )
 from tests import oracles, robots_for_tests
 from tests import tolerances as tol
-from tests.test_worked_examples import ITEMS, real
+from tests.worked_examples import ITEMS, real
 
 SCALES = st.sampled_from([1e-150, 1e-6, 1.0, 1e6, 1e150])
 

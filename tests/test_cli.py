@@ -22,6 +22,7 @@ from cartctl.cli.choices import PATHS, PLANES
 from cartctl.cli.console import number
 from cartctl.cli.probes import PACKAGES
 from cartctl.errors import ParameterError
+from tests.interruptions import interrupt_at
 
 ROOT = Path(__file__).resolve().parents[1]
 QUICK = ("--dt", "0.01", "--duration", "0.3")
@@ -405,18 +406,6 @@ def test_too_many_steps_are_said_as_such(arm: str, monkeypatch: pytest.MonkeyPat
 
 
 # --- interruption ----------------------------------------------------------------------------------------------------
-
-
-def interrupt_at(wanted: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Ctrl-C during that step of the controller."""
-    original, made = cc.Controller.step, iter(range(10**9))
-
-    def step(self: cc.Controller, *args: object) -> cc.Command:
-        if next(made) == wanted:
-            raise KeyboardInterrupt
-        return original(self, *args)  # type: ignore[arg-type]
-
-    monkeypatch.setattr(cc.Controller, "step", step)
 
 
 def test_ctrl_c_saves_what_there_is(arm: str, plain: None, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -27,6 +27,7 @@ from cartctl.report.comparison_page import comparison_page
 from cartctl.report.html import page
 from cartctl.report.palette import COLORS, color
 from tests.chromium import difference, needs_chromium, share, shoot
+from tests.interruptions import interrupt_at
 from tests.report_runs import panda_run, planar_run
 from tests.test_html import HOSTILE, Reader, commands_of, tracks_of
 from tests.test_plots import lines, panel
@@ -519,18 +520,6 @@ def test_bad_options_are_one_line_and_leave_nothing(folder: Path, options: list[
     (line,) = result.stderr.splitlines()
     assert line.startswith("error: ") and words in line
     assert os.listdir() == ["file"]
-
-
-def interrupt_at(wanted: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Ctrl-C during that step, counted over all controllers."""
-    original, made = cc.Controller.step, iter(range(10**9))
-
-    def step(self: cc.Controller, *args: object) -> cc.Command:
-        if next(made) == wanted:
-            raise KeyboardInterrupt
-        return original(self, *args)  # type: ignore[arg-type]
-
-    monkeypatch.setattr(cc.Controller, "step", step)
 
 
 def test_ctrl_c_keeps_and_reports_what_is_done(folder: Path, plain: None, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -12,7 +12,8 @@ from cartctl import HQP, SNS, Equation, Inequality, Problem, Status, solve
 from cartctl.errors import ParameterError
 from tests import oracles, prioritised
 from tests import tolerances as tol
-from tests.test_sns import CASES, INSIDE, PROVEN, check_random, problem_of, same
+from tests.sns_cases import CASES, problem_of
+from tests.test_sns import INSIDE, PROVEN, check_random, same
 
 STALLS = (110_044, 119_180)  # the seeds of test_many_more without an answer yet
 RANKED = {"inequalities": True, "fits": ("least_squares",)}

@@ -33,6 +33,7 @@ MAY_IMPORT = {
     "constraints": ROBOT | {"algebra"},
     "objectives": ROBOT | {"algebra"},
     "analysis": ROBOT | {"algebra", "tasks"},
+    "statics": GROUND | {"spatial", "algebra"},
     "levels": JOINED - {"levels"},
     "files": {"errors"},
     "motion": JOINED | {"files"},
@@ -160,7 +161,7 @@ def test_solvers_work_without_pinocchio():
         "    p = cc.Problem([([[1.0, 2.0], [3.0, -1.0]], [1.0, 2.0])])\n"
         "    s = cc.solve(p, name)\n"
         "    assert s.residuals[0] < 3.0 and s.status\n"
-        "import cartctl.spatial\n"
+        "import cartctl.spatial, cartctl.statics\n"
     )
 
 
@@ -175,5 +176,8 @@ def test_every_public_name_resolves_and_unknown_ones_do_not():
         value = getattr(cartctl, name)
         assert name == "__version__" or callable(value), f"cc.{name} is {value!r}"
         assert name in dir(cartctl)
+    for name in cartctl._MODULES:
+        assert getattr(cartctl, name).__name__ == f"cartctl.{name}"
+        assert all(hasattr(getattr(cartctl, name), inner) for inner in getattr(cartctl, name).__all__)
     with pytest.raises(AttributeError, match="no_such_name"):
         cartctl.no_such_name  # noqa: B018

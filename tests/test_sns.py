@@ -20,17 +20,12 @@ from cartctl import SNS, Equation, Inequality, Problem, Solution, Status, solve
 from cartctl.errors import UnsupportedProblem
 from tests import oracles, prioritised
 from tests import tolerances as tol
-from tests.test_worked_examples import ITEMS, planar_drift, real
+from tests.sns_cases import CASES, problem_of
+from tests.test_worked_examples import planar_drift
+from tests.worked_examples import ITEMS, real
 
-CASES = json.loads((Path(__file__).parent / "data/sns_cases.json").read_text())["cases"]
 PROVEN = 1e-7  # of a certificate
 INSIDE = 1e-10  # of what u is made of
-
-
-def problem_of(case):
-    drifts = case["dJdq"] or [None] * len(case["J"])
-    equations = [Equation(A, b, drift=d) for A, b, d in zip(case["J"], case["dx"], drifts, strict=True)]
-    return Problem(equations, lower=case["lower"], upper=case["upper"], reference=case["bias"])
 
 
 def same(one, other, message="", atol=1e-8):

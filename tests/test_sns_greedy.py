@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import json
 from collections import Counter
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -16,17 +14,12 @@ from cartctl import Equation, Problem, SNSGreedy, Status, solve
 from cartctl.errors import ParameterError
 from tests import oracles
 from tests import tolerances as tol
-from tests.test_worked_examples import ITEMS, planar_drift, real
+from tests.sns_cases import CASES, problem_of
+from tests.test_worked_examples import planar_drift
+from tests.worked_examples import ITEMS, real
 
-CASES = json.loads((Path(__file__).parent / "data/sns_cases.json").read_text())["cases"]
 INSIDE = 1e-10
 ABOVE = 1e-9  # of a scale
-
-
-def problem_of(case):
-    drifts = case["dJdq"] or [None] * len(case["J"])
-    equations = [Equation(A, b, drift=d) for A, b, d in zip(case["J"], case["dx"], drifts, strict=True)]
-    return Problem(equations, lower=case["lower"], upper=case["upper"], reference=case["bias"])
 
 
 def check(solution):

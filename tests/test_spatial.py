@@ -168,6 +168,106 @@ def test_euler_angles_give_the_rotation_back(sequence, seed, locked, mirrored):
         assert again[2] == pytest.approx(0.0, abs=tol.ROTATION)
 
 
+def extrinsic(sequence, phi):
+    """R from elementary rotations about axes that stay: the last one leftmost."""
+    return intrinsic(sequence[::-1], phi[::-1])
+
+
+FORMS = {"moving": intrinsic, "fixed": extrinsic}
+
+
+@pytest.mark.parametrize("about", FORMS)
+@pytest.mark.parametrize("sequence", spatial.EULER_SEQUENCES)
+@given(seed=oracles.SEEDS)
+def test_every_form_of_the_rates_by_finite_differences(sequence, about, seed):
+    """S(omega) = R_dot R^T in the base's axes, R^T R_dot in the body's."""
+    rng = np.random.default_rng(seed)
+    phi, rate, h = rng.uniform(-math.pi, math.pi, 3), rng.normal(size=3), 1e-6
+    R = FORMS[about](sequence, phi)
+    np.testing.assert_allclose(spatial.euler_rotation(sequence, phi, about), R, atol=tol.ROTATION)
+    R_dot = (FORMS[about](sequence, phi + h * rate) - FORMS[about](sequence, phi - h * rate)) / (2.0 * h)
+    base = spatial.euler_rates(sequence, phi, about) @ rate
+    body = spatial.euler_rates(sequence, phi, about, "body") @ rate
+    np.testing.assert_allclose(base, spatial.vee(R_dot @ R.T), atol=tol.DIFFERENCE)
+    np.testing.assert_allclose(body, spatial.vee(R.T @ R_dot), atol=tol.DIFFERENCE)
+    np.testing.assert_allclose(R @ body, base, atol=tol.LOG)
+
+
+@pytest.mark.parametrize("about", FORMS)
+@pytest.mark.parametrize("sequence", spatial.EULER_SEQUENCES)
+@given(seed=oracles.SEEDS)
+def test_the_lock_says_what_the_matrix_says(sequence, about, seed):
+    """det T with its sign, how far phi_2 is from the nearest zero of it, and the direction that is being lost."""
+    rng = np.random.default_rng(seed)
+    phi = rng.uniform(-2.0 * math.pi, 2.0 * math.pi, 3)
+    lock = spatial.euler_lock(sequence, phi, about)
+    T = spatial.euler_rates(sequence, phi, about)
+    assert lock.determinant == pytest.approx(np.linalg.det(T), abs=tol.ROTATION * 10)
+    assert np.linalg.det(spatial.euler_rates(sequence, phi, about, "body")) == pytest.approx(lock.determinant)
+    zeros = np.arange(-6, 7) * math.pi + (0.0 if sequence[0] == sequence[2] else math.pi / 2.0)
+    assert lock.distance == pytest.approx(np.abs(zeros - phi[1]).min(), abs=tol.LOG)
+    far = 2 if about == "moving" else 0
+    assert np.linalg.norm(lock.lost) == pytest.approx(1.0)
+    assert np.linalg.solve(T, lock.lost)[far] * lock.determinant == pytest.approx(1.0 if far else -1.0)
+    phi[1] = rng.choice(zeros)
+    locked = spatial.euler_lock(sequence, phi, about)
+    np.testing.assert_allclose(locked.lost @ spatial.euler_rates(sequence, phi, about), 0.0, atol=tol.LOG)
+    np.testing.assert_allclose([locked.determinant, locked.distance], 0.0, atol=tol.LOG)
+
+
+@pytest.mark.parametrize("sequence", spatial.EULER_SEQUENCES)
+@given(seed=oracles.SEEDS)
+def test_angles_about_fixed_axes(sequence, seed):
+    R = oracles.random_rotation(np.random.default_rng(seed))
+    phi = spatial.euler_angles(sequence, R, about="fixed")
+    np.testing.assert_allclose(extrinsic(sequence, phi), R, atol=tol.PENROSE * 1e3)
+    np.testing.assert_allclose(
+        np.cos(phi), np.cos(spatial.euler_angles(sequence[::-1], R)[::-1]), atol=tol.PENROSE * 1e3
+    )
+
+
+@given(oracles.SEEDS)
+def test_roll_pitch_and_yaw_are_pinocchios(seed):
+    """XYZ about fixed axes is what URDF and Pinocchio call rpy."""
+    rpy = np.random.default_rng(seed).uniform(-1.5, 1.5, 3)
+    R = pin.rpy.rpyToMatrix(rpy)
+    np.testing.assert_allclose(spatial.euler_rotation("XYZ", rpy, "fixed"), R, atol=tol.ROTATION)
+    np.testing.assert_allclose(spatial.euler_angles("XYZ", R, "fixed"), rpy, atol=tol.PENROSE * 1e3)
+    frames = {"base": pin.ReferenceFrame.WORLD, "body": pin.ReferenceFrame.LOCAL}
+    for axes, frame in frames.items():
+        T = pin.rpy.computeRpyJacobian(rpy, frame)
+        np.testing.assert_allclose(spatial.euler_rates("XYZ", rpy, "fixed", axes), T, atol=tol.ROTATION)
+
+
+def test_the_printed_matrix_of_zyz():
+    """[[0, -s_phi, c_phi s_theta], [0, c_phi, s_phi s_theta], [1, 0, c_theta]] maps rates to omega."""
+    phi, theta = 0.7, -1.1
+    T = [
+        [0.0, -math.sin(phi), math.cos(phi) * math.sin(theta)],
+        [0.0, math.cos(phi), math.sin(phi) * math.sin(theta)],
+        [1.0, 0.0, math.cos(theta)],
+    ]
+    np.testing.assert_allclose(spatial.euler_rates("ZYZ", [phi, theta, 2.0]), T, atol=tol.ROTATION)
+
+
+@pytest.mark.parametrize(
+    ("call", "says"),
+    [
+        (lambda: spatial.euler_rotation("XYZ", np.zeros(3), "rotating"), "'moving', 'fixed'"),
+        (lambda: spatial.euler_angles("XYZ", np.eye(3), about=None), "about is None"),
+        (lambda: spatial.euler_rates("XYZ", np.zeros(3), axes="tool"), "'base', 'body'"),
+        (lambda: spatial.euler_lock("xyz", np.zeros(3)), "sequence is 'xyz'"),
+        (lambda: spatial.euler_angles("XYZ", np.zeros((3, 3))), "expected a rotation matrix"),
+        (lambda: spatial.log3(np.ones((3, 3))), "expected a rotation matrix"),
+        (lambda: spatial.euler_lock("XYZ", np.zeros(3), "base"), "about is 'base'"),
+    ],
+)
+def test_unknown_options_are_named(call, says):
+    with pytest.raises(ParameterError) as caught:
+        call()
+    assert says in str(caught.value)
+
+
 # ---------------------------------------------------------------- velocity conversion
 
 

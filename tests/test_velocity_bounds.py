@@ -19,7 +19,6 @@ from tests import oracles
 from tests.joint_rollouts import INF, limits
 
 DTS = [1e-4, 1e-3, 2e-2]
-SHARES = st.lists(st.one_of(st.sampled_from([0.0, 1.0]), st.floats(0.0, 1.0)), min_size=1, max_size=60)
 
 
 def one(x):
@@ -31,28 +30,6 @@ def box_of(dt, q, v, **given):
 
 
 # ---------------------------------------------------------------- inside
-
-
-@pytest.mark.parametrize("dt", DTS)
-def test_limits_are_kept_whatever_is_chosen(dt):
-    rng, n = np.random.default_rng(1), 1000 // jr.FEWER
-    lim = jr.random_limits(rng, n, dt)
-    q = jr.resting_inside(rng, lim)
-    nearest = jr.check_kept(VelocityBounds, lim, dt, q, jr.Adversary(rng, n, 10.0), 5000 // jr.FEWER)
-    assert (np.abs(nearest) < 1e-9).mean() > 0.3 or not jr.COMPILED  # many were driven into their limits
-
-
-@given(oracles.SEEDS, oracles.magnitudes(1e-4, 2e-2), SHARES)
-def test_limits_are_kept_by_any_sequence(seed, dt, shares):
-    rng = np.random.default_rng(seed)
-    lim = jr.random_limits(rng, 5, dt)
-    sequence = iter(shares * 40)
-
-    def u_of(bounds):
-        low, high = np.maximum(bounds.lower, -20.0), np.minimum(bounds.upper, 20.0)
-        return np.minimum(low + next(sequence) * (high - low), high)
-
-    jr.check_kept(VelocityBounds, lim, dt, jr.resting_inside(rng, lim), u_of, 40 * len(shares))
 
 
 @given(oracles.SEEDS, oracles.magnitudes(1e-3, 2e-2), oracles.magnitudes(1e-2, 1e3), st.floats(0.0, 1.0))

@@ -6,38 +6,38 @@ Items of their own as in tests/test_worked_examples.py, and further methods on t
 from __future__ import annotations
 
 import math
+from importlib import import_module
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from cartctl import Equation, Problem, Status, solve
-from tests import oracles, test_worked_examples
+from tests import oracles
 from tests import tolerances as tol
-from tests.test_worked_examples import ITEMS, compare, pinv, planar_drift, rates, real
+from tests.test_worked_examples import pinv, planar_drift, rates
+from tests.worked_examples import ITEMS, Answers, real
 
-ANSWERS = {}
-
-
-def example(identifier):
-    def register(function):
-        ANSWERS[identifier] = function
-        return function
-
-    return register
-
-
-def pytest_generate_tests(metafunc):
-    if "identifier" in metafunc.fixturenames:
-        metafunc.parametrize("identifier", ANSWERS)
+ANSWERS = Answers()
+example, pytest_generate_tests = ANSWERS.example, ANSWERS.parametrize
 
 
 def test_worked_example(identifier):
-    compare(ITEMS[identifier], ANSWERS[identifier](ITEMS[identifier]["inputs"]))
+    ANSWERS.check(identifier)
+
+
+def test_every_answer_has_its_item():
+    assert set(every_answer()) <= set(ITEMS)
 
 
 def test_every_item_is_answered_once():
-    assert not set(ANSWERS) & set(test_worked_examples.ANSWERS)
-    assert set(ANSWERS) | set(test_worked_examples.ANSWERS) == set(ITEMS)
+    assert sorted(every_answer()) == sorted(ITEMS)
+
+
+def every_answer():
+    """The identifiers that the files of worked examples answer, with repetitions."""
+    files = sorted(Path(__file__).parent.glob("test_worked_examples*.py"))
+    return [name for file in files for name in import_module(f"tests.{file.stem}").ANSWERS]
 
 
 # ---------------------------------------------------------------- reduced gradient, extended Jacobian

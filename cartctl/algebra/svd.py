@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.linalg import blas, lapack
 
+from cartctl import checks
 from cartctl.checks import FloatArray
 
 _nrm2 = blas.dnrm2
@@ -51,6 +52,13 @@ def singular_values(A: FloatArray) -> FloatArray:
 def round_off(A: FloatArray) -> float:
     """The size below which singular values of A, or of a projection of A, are round-off."""
     return ROUND_OFF * max(A.shape) * scale(A)  # type: ignore[no-any-return]
+
+
+def floor(A: FloatArray, tolerance: float | None) -> float:
+    """The size up to which a singular value of A counts as zero: tolerance times its Frobenius norm, or round-off."""
+    if tolerance is None:
+        return round_off(A)
+    return checks.number("tolerance", tolerance, low=0.0) * scale(A)
 
 
 def scale(A: FloatArray) -> float:

@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 
 from cartctl import checks
-from cartctl.algebra.svd import numerical_rank, scale, singular_values, svd
-from cartctl.analysis.spectrum import floor
+from cartctl.algebra.svd import floor, numerical_rank, scale, singular_values, svd
 from cartctl.checks import FloatArray
 from cartctl.errors import ParameterError, ShapeError
 

@@ -10,8 +10,7 @@ import numpy as np
 
 from cartctl import checks
 from cartctl.algebra.metric import Whitening, as_metric
-from cartctl.algebra.svd import numerical_rank, svd
-from cartctl.analysis.spectrum import floor
+from cartctl.algebra.svd import floor, numerical_rank, svd
 from cartctl.checks import FloatArray
 from cartctl.errors import ParameterError
 

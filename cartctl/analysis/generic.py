@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cartctl import checks
-from cartctl.algebra.svd import numerical_rank, scale, singular_values
+from cartctl.algebra.svd import floor, numerical_rank, scale, singular_values
 from cartctl.analysis.box import Box, Space, space_of
-from cartctl.analysis.spectrum import floor
 from cartctl.checks import FloatArray
 
 if TYPE_CHECKING:

@@ -65,16 +65,9 @@ def spectrum(A: Any, tolerance: float | None = None) -> Spectrum:
     """
     matrix = checks.matrix("A", A)
     values = svd.singular_values(matrix)
-    rank = svd.numerical_rank(values, floor(matrix, tolerance))
+    rank = svd.numerical_rank(values, svd.floor(matrix, tolerance))
     m, n = matrix.shape
     return Spectrum(m, n, values, rank, _determinant(matrix, rank) if m == n else None)
-
-
-def floor(A: FloatArray, tolerance: float | None) -> float:
-    """The size up to which a singular value of A counts as zero."""
-    if tolerance is None:
-        return svd.round_off(A)
-    return checks.number("tolerance", tolerance, low=0.0) * svd.scale(A)
 
 
 def rank(A: Any, tolerance: float | None = None) -> int:

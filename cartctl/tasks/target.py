@@ -12,8 +12,7 @@ from cartctl import checks
 from cartctl.checks import FloatArray
 from cartctl.errors import TargetError
 from cartctl.paths import Path
-
-_ORTHONORMAL = 1e-6
+from cartctl.spatial.rotations import is_rotation, off_rotation
 
 
 class Goal:
@@ -83,10 +82,9 @@ def point_target(value: Any, name: str, size: int | None = None, *, in_space: bo
 
 
 def _rotation(R: FloatArray, name: str) -> FloatArray:
-    error = float(np.abs(R.T @ R - np.eye(3)).max())
-    if error > _ORTHONORMAL or np.linalg.det(R) < 0.0:
+    if not is_rotation(R):
         raise TargetError(
-            f"{name}: its rotation is off R^T R = I, det R = 1 by {error:.2g}; expected a rotation matrix"
+            f"{name}: its rotation is off R^T R = I, det R = 1 by {off_rotation(R):.2g}; expected a rotation matrix"
         )
     return np.array(R)
 
