@@ -37,6 +37,7 @@ END = 1e-9  # s this far outside [0, 1] is round-off
 _DEPENDENT = 2e-8  # of the task's own size: what is left of a row is noise
 _ROUND_OFF = 1e-12  # of s, or of the size of u
 _BLUR = 2e-15  # of the largest term of a row that pins s: its round-off
+_BLURRED = 1e-6  # s is never less sure than this
 _SAME = 1e-8  # relative: sides that differ by less agree
 _NEGLECTED = 3.0  # times what is neglected of a row: or by less than this
 
@@ -159,16 +160,17 @@ def add_rows(
             _prove_row(w, q, e, i, pin, at, bt, proof)
             return False, math.nan, 0.0, pin, lost
         pinned = at / bt
+        unsure = min((_BLUR + noise(w) + part_of * neglected) * max(at_size, bt_size) / abs(bt), _BLURRED)
         if pinned < 0.0 and abs(at) <= same * at_size:
             pinned = 0.0
         elif pinned > 1.0 and abs(at - bt) <= same * max(at_size, bt_size):
             pinned = 1.0
-        if pinned < -END or pinned > 1.0 + END or (pin != NOBODY and abs(pinned - s) > same):
+        outside = max(-pinned, pinned - 1.0) > END + unsure
+        if outside or (pin != NOBODY and abs(pinned - s) > same + unsure + blur):
             _prove_row(w, q, e, i, pin, at, bt, proof)
             return False, math.nan, 0.0, pin, lost
-        if pin == NOBODY:
-            pin, s = -1 - i, max(0.0, pinned) if pinned < 1.0 - _ROUND_OFF else 1.0
-            blur = min((_BLUR + noise(w) + part_of * neglected) * max(at_size, bt_size) / abs(bt), same)
+        if pin == NOBODY or unsure < blur:  # the surest row pins s
+            pin, s, blur = -1 - i, max(0.0, pinned) if pinned < 1.0 - _ROUND_OFF else 1.0, unsure
             for j in range(w.K[NUM, 0]):
                 w.V[Y, j] = -w.V[SUM, j]
             refill(w, s)
