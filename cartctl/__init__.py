@@ -172,8 +172,8 @@ if TYPE_CHECKING:  # editors and mypy see what __getattr__ finds
 
 
 def __getattr__(name: str) -> Any:
-    if name == "analysis":
-        return import_module("cartctl.analysis")
+    if name in ("analysis", "dynamics"):
+        return import_module(f"cartctl.{name}")
     if name not in _HOME_OF:
         raise AttributeError(f"module 'cartctl' has no attribute {name!r}")
     try:

@@ -1,0 +1,25 @@
+"""The textbook terms of rigid-body dynamics, beside what Pinocchio computes: ``from cartctl import dynamics``.
+
+Of a robot at a State: Christoffel symbols, factorisations of the velocity terms, energies, gravity in any direction.
+Of arrays: the Cartesian inertia, the check of an inertia matrix, uniform time scaling, uniform bodies. Of a table of
+Denavit-Hartenberg parameters: the moving-frames recursion and the equations of motion, as numbers or as the textbooks
+print them (SymPy, the extra ``symbolic``).
+"""
+
+from cartctl.dynamics.cartesian import CartesianInertia, cartesian_inertia
+from cartctl.dynamics.christoffel import christoffel, coriolis, mass_matrix_derivatives, mass_matrix_rate
+from cartctl.dynamics.energy import Energy, energy, energy_rate, gravity_torques, velocity_torques
+
+__all__ = [
+    "CartesianInertia",
+    "Energy",
+    "cartesian_inertia",
+    "christoffel",
+    "coriolis",
+    "energy",
+    "energy_rate",
+    "gravity_torques",
+    "mass_matrix_derivatives",
+    "mass_matrix_rate",
+    "velocity_torques",
+]
