@@ -6,20 +6,37 @@ Denavit-Hartenberg parameters: the moving-frames recursion and the equations of 
 print them (SymPy, the extra ``symbolic``).
 """
 
+from cartctl.dynamics.bodies import Body, box, cone, cylinder, disk, ellipsoid, point_mass, rod, sphere
 from cartctl.dynamics.cartesian import CartesianInertia, cartesian_inertia
 from cartctl.dynamics.christoffel import christoffel, coriolis, mass_matrix_derivatives, mass_matrix_rate
 from cartctl.dynamics.energy import Energy, energy, energy_rate, gravity_torques, velocity_torques
+from cartctl.dynamics.inertia_check import InertiaCheck, check_inertia_matrix
+from cartctl.dynamics.scaling import TimeScaling, motion_torques, time_scaling
 
 __all__ = [
+    "Body",
     "CartesianInertia",
     "Energy",
+    "InertiaCheck",
+    "TimeScaling",
+    "box",
     "cartesian_inertia",
+    "check_inertia_matrix",
     "christoffel",
+    "cone",
     "coriolis",
+    "cylinder",
+    "disk",
+    "ellipsoid",
     "energy",
     "energy_rate",
     "gravity_torques",
     "mass_matrix_derivatives",
     "mass_matrix_rate",
+    "motion_torques",
+    "point_mass",
+    "rod",
+    "sphere",
+    "time_scaling",
     "velocity_torques",
 ]
