@@ -9,15 +9,22 @@ print them (SymPy, the extra ``symbolic``).
 from cartctl.dynamics.bodies import Body, box, cone, cylinder, disk, ellipsoid, point_mass, rod, sphere
 from cartctl.dynamics.cartesian import CartesianInertia, cartesian_inertia
 from cartctl.dynamics.christoffel import christoffel, coriolis, mass_matrix_derivatives, mass_matrix_rate
+from cartctl.dynamics.dh import DHArm, DHLink
 from cartctl.dynamics.energy import Energy, energy, energy_rate, gravity_torques, velocity_torques
 from cartctl.dynamics.inertia_check import InertiaCheck, check_inertia_matrix
+from cartctl.dynamics.lagrange import euler_lagrange, from_inertia_matrix
+from cartctl.dynamics.moving_frames import LinkMotion, MovingFrames, moving_frames
 from cartctl.dynamics.scaling import TimeScaling, motion_torques, time_scaling
 
 __all__ = [
     "Body",
     "CartesianInertia",
+    "DHArm",
+    "DHLink",
     "Energy",
     "InertiaCheck",
+    "LinkMotion",
+    "MovingFrames",
     "TimeScaling",
     "box",
     "cartesian_inertia",
@@ -30,10 +37,13 @@ __all__ = [
     "ellipsoid",
     "energy",
     "energy_rate",
+    "euler_lagrange",
+    "from_inertia_matrix",
     "gravity_torques",
     "mass_matrix_derivatives",
     "mass_matrix_rate",
     "motion_torques",
+    "moving_frames",
     "point_mass",
     "rod",
     "sphere",
