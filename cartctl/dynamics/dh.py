@@ -1,7 +1,7 @@
 """Arms as tables of standard Denavit-Hartenberg parameters with masses: numbers, or formulas such as ``"dc1 - l1"``.
 
-Frame i sits at the far end of link i: ``^{i-1}A_i = Rz(theta) Tz(d) Tx(a) Rx(alpha)``. Joint i turns about (R) or slides
-along (P) the axis z of frame i-1, and its coordinate q_i adds to theta (R) or to d (P).
+Frame i sits at the far end of link i: ``^{i-1}A_i = Rz(theta) Tz(d) Tx(a) Rx(alpha)``. Joint i turns about (R) or
+slides along (P) the axis z of frame i-1, and its coordinate q_i adds to theta (R) or to d (P).
 """
 
 from __future__ import annotations
@@ -82,7 +82,9 @@ class DHArm:
         object.__setattr__(self, "gravity", _triple("gravity", self.gravity))
         taken = self.names & {f"{d}q{i + 1}" for i in range(self.n) for d in ("", "d", "dd")}
         if taken:
-            raise ParameterError(f"{min(taken)!r} stands in the table; expected another name, as q1, dq1, ... are taken")
+            raise ParameterError(
+                f"{min(taken)!r} stands in the table; expected another name, as q1, dq1, ... are taken"
+            )
 
     @property
     def n(self) -> int:

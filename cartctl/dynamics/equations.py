@@ -1,4 +1,4 @@
-"""Equations of motion in symbols: T, U, M, c, g as SymPy expressions, as text, as LaTeX, and as functions of numbers."""
+"""Equations of motion in symbols: T, U, M, c, g as SymPy expressions, as text, as LaTeX, as functions of numbers."""
 
 from __future__ import annotations
 
@@ -41,7 +41,17 @@ class Equations:
     ) -> None:
         self.q, self.dq = sympy.Matrix(q), sympy.Matrix(dq)
         self.ddq = sympy.Matrix([sympy.Symbol(f"dd{x}") for x in q])
-        self._raw = {"T": kinetic, "U": potential, "M": M, "C": C, "S": S, "plain": plain, "c": c, "g": g, "M_dot": M_dot}
+        self._raw = {
+            "T": kinetic,
+            "U": potential,
+            "M": M,
+            "C": C,
+            "S": S,
+            "plain": plain,
+            "c": c,
+            "g": g,
+            "M_dot": M_dot,
+        }
         self._masses, self._order = list(masses), list(order)
 
     @property
@@ -200,7 +210,7 @@ class NumericEquations:
 
     def torque(self, q: Any, dq: Any, ddq: Any) -> FloatArray:
         """``M(q) ddq + c(q, dq) + g(q)`` (n,): inverse dynamics."""
-        return self.M(q) @ checks.vector("ddq", ddq, self.n) + self.c(q, dq) + self.g(q)  # type: ignore[no-any-return]
+        return self.M(q) @ checks.vector("ddq", ddq, self.n) + self.c(q, dq) + self.g(q)
 
     def _call(self, function: Callable[..., Any], q: Any, dq: Any) -> FloatArray:
         return np.array(function(checks.vector("q", q, self.n), checks.vector("dq", dq, self.n)), dtype=np.float64)

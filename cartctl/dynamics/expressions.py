@@ -1,7 +1,7 @@
 """Formulas written as text, ``"m1*dc1**2"``: arithmetic alone is read, nothing is executed.
 
 The same text becomes a number (with the values of its names) or a SymPy expression. Names are what a letter begins;
-``pi`` is pi, and sin, cos and sqrt are functions. ``E`` and ``I`` are names like any other, not e and the imaginary unit.
+``pi`` is pi, and sin, cos and sqrt are functions. ``E`` and ``I`` are names like any other, not e and sqrt(-1).
 """
 
 from __future__ import annotations
@@ -63,7 +63,7 @@ def number(name: str, value: float | str, given: Mapping[str, float]) -> float:
             raise ValueError
         return checks.number(name, result)
     except (ArithmeticError, ValueError) as error:
-        if isinstance(error, (ParameterError,)):
+        if isinstance(error, ParameterError):
             raise
         raise ParameterError(f"{name} = {value!r} has no real value here ({error})") from None
 

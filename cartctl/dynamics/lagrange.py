@@ -3,7 +3,7 @@
     d/dt (dL/d dq) - dL/dq = u,   L = T - U,   T = 1/2 dq^T M dq
     M(q) ddq + c(q, dq) + g(q) = u
 
-with ``c_i = dq^T C_i dq``, ``C_i = 1/2 (dM_i/dq + (dM_i/dq)^T - dM/dq_i)``, ``g = dU/dq`` (Siciliano et al. 2009, ch. 7).
+with ``c_i = dq^T C_i dq``, ``C_i = 1/2 (dM_i/dq + (dM_i/dq)^T - dM/dq_i)``, ``g = dU/dq`` (Siciliano et al. 2009).
 """
 
 from __future__ import annotations
@@ -132,8 +132,9 @@ def _equations(
         plain=plain,
         c=S @ rates,
         g=np.array([U.diff(x) for x in q]),
-        M_dot=np.array([[sum((D[k, i, j] * rates[k] for k in range(n)), ground.constant(0)) for j in range(n)]
-                        for i in range(n)]),
+        M_dot=np.array(
+            [[sum((D[k, i, j] * rates[k] for k in range(n)), ground.constant(0)) for j in range(n)] for i in range(n)]
+        ),
         masses=symbols[0],
         order=symbols[1],
     )

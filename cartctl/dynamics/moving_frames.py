@@ -3,7 +3,7 @@
 With sigma_i = 0 for a revolute, 1 for a prismatic joint, z = (0, 0, 1) and everything of link i in frame i
 
     omega_i = R_i^T (omega_{i-1} + (1 - sigma_i) dq_i z)
-    v_i     = R_i^T (v_{i-1} + sigma_i dq_i z) + omega_i x r_i        r_i from the origin of frame i-1 to that of frame i
+    v_i     = R_i^T (v_{i-1} + sigma_i dq_i z) + omega_i x r_i        r_i from the origin of frame i-1 to frame i
     v_ci    = v_i + omega_i x r_ci
     T_i     = 1/2 m_i v_ci^T v_ci + 1/2 omega_i^T I_ci omega_i        (Koenig)
 
@@ -82,8 +82,8 @@ def moving_frames(arm: DHArm, q: Any, dq: Any) -> MovingFrames:
         own = columns.mass_matrix()
         own[i, i] += columns.rotor
         M += own
-        velocities = (np.array(part @ rates) for part in (columns.angular, columns.linear, columns.com))
-        links.append(LinkMotion(*velocities, kinetic=0.5 * float(rates @ own @ rates)))
+        angular, linear, com = (np.array(part @ rates) for part in (columns.angular, columns.linear, columns.com))
+        links.append(LinkMotion(angular, linear, com, kinetic=0.5 * float(rates @ own @ rates)))
     return MovingFrames(tuple(links), sum(link.kinetic for link in links), M)
 
 

@@ -1,8 +1,8 @@
 """Sums of cosines and sines as the textbooks print them: ``m2 l1 dc2 cos(q2)``, ``m3 (l1^2 + dc3^2)``, ``sin(q2)^2``.
 
 What multiplies one monomial of the parameters is a short sum with rational coefficients. It is folded into products and
-squares where that leaves fewer terms (``cos(q3) + cos(2 q2 + q3)`` is ``2 cos(q2) cos(q2 + q3)``); then equal products of
-sines and cosines are collected, and what multiplies them factored. Needs SymPy.
+squares where that leaves fewer terms (``cos(q3) + cos(2 q2 + q3)`` is ``2 cos(q2) cos(q2 + q3)``); then equal products
+of sines and cosines are collected, and what multiplies them factored. Needs SymPy.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ def compact(total: TrigSum, masses: Iterable[Any] = (), rates: Iterable[Any] = (
             products[product] = p + ground.ring({monomial: value})
     indices = {g: k for k, g in enumerate(ground.generators)}
     heavy, quick = ([indices[x] for x in group if x in indices] for group in (masses, rates))
-    terms = []
+    terms: list[Any] = []
     for product, p in products.items():
         waves_ = sympy.Mul(*(_wave(ground, wave) ** power for wave, power in product))
         terms.extend(x * waves_ for x in _factored(ground, p, heavy, quick))
@@ -49,7 +49,7 @@ def _factored(ground: Ground, p: Any, heavy: Sequence[int], quick: Sequence[int]
     """Summands of p: each a polynomial of the parameters times one of the rates."""
     content, whole = sympy.factor(ground.coefficient(p)).as_coeff_Mul()
     if not whole.is_Add:
-        return [content * whole]
+        return [content * _by_mass(ground, whole, heavy)]
     by_parameters: dict[Any, Any] = {}
     for monomial, value in p.terms():
         key, rest = _split(monomial, quick)
@@ -67,16 +67,22 @@ def _factored(ground: Ground, p: Any, heavy: Sequence[int], quick: Sequence[int]
 
 
 def _collected(ground: Ground, p: Any, heavy: Sequence[int]) -> Any:
-    """p factored, or else each mass with what it is multiplied by."""
+    """Factored, or else each mass with what it is multiplied by."""
     content, whole = sympy.factor(ground.coefficient(p)).as_coeff_Mul()
     if not whole.is_Add:
-        return content * whole
+        return content * _by_mass(ground, whole, heavy)
     groups: dict[Any, Any] = {}
     for monomial, value in (p * (1 / sympy.QQ(content.p, content.q))).terms():
         key = tuple(monomial[k] for k in heavy)
         groups[key] = groups.get(key, ground.ring.zero) + ground.ring({monomial: value})
     inside = sympy.Add(*(sympy.factor(ground.coefficient(part)) for part in groups.values()))
     return sympy.Mul(content, inside, evaluate=False) if content != 1 else inside
+
+
+def _by_mass(ground: Ground, whole: Any, heavy: Sequence[int]) -> Any:
+    """A product whose sums say what each mass is multiplied by."""
+    masses = [ground.generators[k] for k in heavy]
+    return sympy.Mul(*(sympy.collect(f, masses) if f.is_Add else f for f in sympy.Mul.make_args(whole)))
 
 
 def _split(monomial: Any, chosen: Sequence[int]) -> tuple[Any, Any]:
@@ -154,7 +160,7 @@ def _halved(f: Frequency) -> Frequency:
 # ---------------------------------------------------------------- printing
 
 
-class TextbookPrinter(StrPrinter):
+class TextbookPrinter(StrPrinter):  # type: ignore[misc]
     """Factors in the order numbers, the given symbols, sines and cosines, rates; blanks instead of stars."""
 
     def __init__(self, order: Sequence[Any]) -> None:
@@ -175,10 +181,10 @@ class TextbookPrinter(StrPrinter):
 
     def _order_of_term(self, term: Any) -> tuple[Any, ...]:
         factors = sympy.Mul.make_args(term)
-        waves = sorted(str(w) for w in term.atoms(sympy.sin, sympy.cos))
+        waves = sorted((len(str(w)), str(w)) for w in term.atoms(sympy.sin, sympy.cos))
         places = sorted(self._place(f) for f in factors if not f.is_Number)
         degree = sum(f.exp if f.is_Pow else 1 + f.is_Add for f in factors if not f.is_Number)
-        return (len(waves), bool(term.could_extract_minus_sign()), degree, places, str(term))
+        return (len(waves), waves, bool(term.could_extract_minus_sign()), degree, places, str(term))
 
     def _print_Add(self, expr: Any, order: Any = None) -> str:  # noqa: ARG002 - SymPy's signature
         text = ""

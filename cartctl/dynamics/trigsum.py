@@ -1,8 +1,8 @@
 """Exact sums of cosines and sines: ``sum_f a_f cos(f) + b_f sin(f)``, f integer combinations of angles.
 
-The coefficients are polynomials in everything else. Every product of sines and cosines is such a sum in one way only, so
-that terms cancel by themselves (sin^2 + cos^2 is 1 as it arises) and equal means equal. Needs SymPy; imported only by
-what makes equations in symbols.
+The coefficients are polynomials in everything else. Every product of sines and cosines is such a sum in one way only,
+so that terms cancel by themselves (sin^2 + cos^2 is 1 as it arises) and equal means equal. Needs SymPy; imported only
+by what makes equations in symbols.
 """
 
 from __future__ import annotations
@@ -196,6 +196,7 @@ class TrigSum:
 
 
 def combined(f: Frequency, g: Frequency, sign: int) -> dict[int, int]:
+    """The counts of ``f + sign g``."""
     counts = dict(f)
     for k, count in g:
         counts[k] = counts.get(k, 0) + sign * count
