@@ -83,7 +83,7 @@ _HOMES = {
         "Waypoints",
     ),
 }
-_MODULES = ("analysis", "spatial", "statics")  # reached as cc.NAME; their names stay inside them
+_MODULES = ("analysis", "dynamics", "spatial", "statics")  # reached as cc.NAME; their names stay inside them
 _HOME_OF = {name: module for module, names in _HOMES.items() for name in names}
 
 __all__ = ["__version__", *sorted(_HOME_OF)]  # noqa: PLE0604 - names, from the table above

@@ -42,6 +42,10 @@ class UnsupportedProblem(CartctlError, ValueError):  # noqa: N818 - the public n
     """The chosen solver cannot honour something in the problem, and says so instead of ignoring it."""
 
 
+class UnsupportedJoint(CartctlError, ValueError):  # noqa: N818 - like its sibling above
+    """A formula does not hold for a kind of joint the robot has."""
+
+
 class SolverOutputError(CartctlError, ValueError):
     """A solver of the user's returned something else than (n,) finite numbers."""
 
