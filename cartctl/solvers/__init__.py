@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from functools import lru_cache
 from importlib import import_module
 from inspect import isabstract
 from types import ModuleType
@@ -63,6 +64,12 @@ def solvers_that_honour(feature: str) -> list[str]:
     return [name for name in _REGISTRY if feature in solver_class(name).honours]
 
 
+@lru_cache
+def _by_name(name: str) -> Solver:
+    """The one instance with default parameters: solvers keep no state, so everybody may have the same."""
+    return solver_class(name)()
+
+
 def get_solver(solver: str | Solver | type[Solver]) -> Solver:
     """An instance: by name, from a class with its default parameters, or as given.
 
@@ -71,7 +78,7 @@ def get_solver(solver: str | Solver | type[Solver]) -> Solver:
     if isinstance(solver, Solver):
         return solver
     if isinstance(solver, str):
-        return solver_class(solver)()
+        return _by_name(solver)
     if isinstance(solver, type) and issubclass(solver, Solver) and not isabstract(solver):
         return solver()
     raise ParameterError(f"solver is {solver!r}; expected a name from cc.solvers() or a Solver instance")

@@ -135,19 +135,34 @@ def arrays_of(problem: Problem, fitted: bool) -> Arrays:
         natural = _sizes((e.size,))
         d = _EMPTY if e.drift is None else e.drift
         return Arrays(e.A, e.b, d, sizes, fits, natural, lower, upper, C, c_lower, c_upper, u0)
-    rows: list[Any] = [e for e in equations if e.fit != "inequality"]
-    kinds = tuple(FITTED if fitted and e.fit == "scale" else _KINDS[e.fit] for e in equations)
-    sizes, fits = _levels(problem.sizes, kinds)
-    natural = _sizes(tuple(0.0 if e.fit == "inequality" else e.size for e in equations))
-    if len(rows) < len(equations):
+    A: list[FloatArray] = []
+    b: list[FloatArray] = []
+    drifts: list[FloatArray | None] = []
+    counts: list[int] = []
+    kinds: list[int] = []
+    nature: list[float] = []
+    soft = drifting = False
+    for e in equations:  # one pass: this is in the way of every solve
+        counts.append(e.A.shape[0])
+        if e.fit == "inequality":
+            soft = True
+            kinds.append(INTERVAL)
+            nature.append(0.0)
+            continue
+        kinds.append(FITTED if fitted else _KINDS[e.fit])
+        nature.append(e.size)
+        A.append(e.A)
+        b.append(e.b)
+        drifts.append(e.drift)
+        drifting = drifting or e.drift is not None
+    sizes, fits = _levels(tuple(counts), tuple(kinds))
+    if soft:
         C, c_lower, c_upper = _with_soft_rows(problem, C, c_lower, c_upper)
-    if not rows:
-        return Arrays(_NO_ROWS, _EMPTY, _EMPTY, sizes, fits, natural, lower, upper, C, c_lower, c_upper, u0)
-    A, b = np.concatenate([e.A for e in rows]), np.concatenate([e.b for e in rows])
     d = _EMPTY
-    if any(e.drift is not None for e in rows):
-        d = np.concatenate([np.zeros(e.b.shape[0]) if e.drift is None else e.drift for e in rows])
-    return Arrays(A, b, d, sizes, fits, natural, lower, upper, C, c_lower, c_upper, u0)
+    if drifting:
+        d = np.concatenate([np.zeros(len(y)) if x is None else x for x, y in zip(drifts, b, strict=True)])
+    rows, right = (np.concatenate(A), np.concatenate(b)) if A else (_NO_ROWS, _EMPTY)
+    return Arrays(rows, right, d, sizes, fits, _sizes(tuple(nature)), lower, upper, C, c_lower, c_upper, u0)
 
 
 def _with_soft_rows(
