@@ -7,7 +7,7 @@ task's Jacobian, ``J v_i = sigma_i u_i``, with the curvature ``h_i = J_dot(v_i) 
 - a target beyond reach pulls by ``p_i = -e . h_i > 0``, which adds to the stiffness: the target is
   ``d_i = |u_i . e| sigma_i / (sigma_i^2 + p_i)`` away (without p_i where the solver slows commands down as a whole),
   and f of it is the largest speed that stops there at the deceleration a_i that the joints have along v_i
-  (:mod:`cartctl.levels.braking`): ``|u_i . K e| <= sigma_i f(d_i)``;
+  (:mod:`cartctl.braking`): ``|u_i . K e| <= sigma_i f(d_i)``;
 - one step may not go further than Newton's, ``|u_i . K e| dt <= |u_i . e| sigma_i^2 / (sigma_i^2 + p_i / eta)``;
 - the singular configuration is ``theta_i = sigma_i / |u_i . h_i|`` away: towards it
   ``|u_i . b| <= w_i sigma_i min(f(theta_i), eta theta_i / dt)``. ``w_i = 1 - (1e-4 ||J|| / sigma_i)^2`` ends the way

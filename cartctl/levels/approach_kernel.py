@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from cartctl.braking import clamp, fastest
 from cartctl.checks import FloatArray
 from cartctl.kernels import kernel, part
-from cartctl.levels.braking import clamp, fastest
 from cartctl.levels.left_out import leave_out
 
 # Rows of the joints' array.
