@@ -34,6 +34,7 @@ from cartctl.levels.approach_kernel import ASKED, BEND, FORWARD, PULL, ROWS, SIG
 from cartctl.levels.calming import Above
 from cartctl.model.limits import Limits
 from cartctl.model.state import State
+from cartctl.solvers import Solver
 from cartctl.tasks.base import Reference, Task
 
 _SHARE = 0.5  # of the acceleration limits: what one direction may count on
@@ -74,8 +75,8 @@ class Directions(NamedTuple):
 class Approach:
     """For one robot, its limits and a step of dt seconds.
 
-    scales: whether the solver slows commands down as a whole; for others they are kept below the joints' speeds.
-    waiting: the tasks whose paths wait for the hand. reference: whether the solver takes one for the null space.
+    solver: one that slows commands down as a whole; for others they are kept below the joints' speeds.
+    waiting: the tasks whose paths wait for the hand.
     """
 
     def __init__(
@@ -83,19 +84,20 @@ class Approach:
         limits: Limits,
         dt: float,
         scratch: State,
-        scales: bool,
+        solver: Solver,
         waiting: Iterable[Task] = (),
-        reference: bool = True,
     ) -> None:
-        self._takes_reference = reference
         self._waiting = {id(task) for task in waiting}
         slowing = _SHARE * np.minimum(limits.acceleration_upper, -limits.acceleration_lower)
         speed = np.minimum(limits.velocity_upper, -limits.velocity_lower)
         still = _AT_REST * np.where(np.isfinite(speed), speed, 1.0)
         self._joints = np.array([slowing, speed, still])
-        self._dt, self._scratch, self._scales = dt, scratch, scales
+        self._dt, self._scratch, self._scales = dt, scratch, solver.scales
         self._bent: dict[int, FloatArray] = {}  # by task: the motion inwards, when it was last clear
-        self._above, self._walls = Above(), Walls(_NOTHING, _NOTHING, np.zeros((0, 0)), _NOTHING, _NOTHING)
+        self._above, self._walls = (
+            Above(ranked=not solver.stacks),
+            Walls(_NOTHING, _NOTHING, np.zeros((0, 0)), _NOTHING, _NOTHING),
+        )
         self._directions, self._hold = directions.compiled, hold.compiled
 
     def begin(

@@ -2,7 +2,8 @@
 
 With N the null space of the tasks above and v_a the least motion that does what they ask, a task below takes
 ``J N w = b - J v_a``. At the edge J N may lose rank, and what little of a direction is left would be paid for with any
-speed; so ``|w_i| <= calm`` for each singular direction of J N, then ``||w|| <= calm``.
+speed; so ``|w_i| <= calm`` for each singular direction of J N, then ``||w|| <= calm``. A solver that weighs tasks
+instead of ranking them has nothing above: there, b is slowed down as it is.
 """
 
 from __future__ import annotations
@@ -15,12 +16,14 @@ from cartctl.algebra.svd import norm
 from cartctl.checks import FloatArray
 
 _NO_FREEDOM = 1e-9  # of the largest: singular values of the tasks above below this leave a motion free
+_CLEAR = 1e-6  # of the largest: singular values below this are none
 
 
 class Above:
     """The tasks above, in this step: their J and b, and the largest speed, in the norm of v, that they leave."""
 
-    def __init__(self) -> None:
+    def __init__(self, ranked: bool) -> None:
+        self._ranked = ranked
         self.clear()
 
     def clear(self) -> None:
@@ -39,6 +42,9 @@ class Above:
         """``b`` (m,) slowed down until the motion that the tasks above leave to it is no faster than calm."""
         if self.calm == math.inf or not J.shape[0]:
             return b
+        if not self._ranked:
+            fastest = norm(np.linalg.lstsq(J, b, rcond=_CLEAR)[0])
+            return b * (self.calm / fastest) if fastest > self.calm else b
         U, s, Vt = np.linalg.svd(np.concatenate(self._rows))
         rank = int(np.count_nonzero(s > _NO_FREEDOM * s[0])) if s.size else 0
         given = Vt[:rank].T @ ((U[:, :rank].T @ np.concatenate(self._asked)) / s[:rank])

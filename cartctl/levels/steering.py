@@ -27,6 +27,7 @@ from cartctl.levels.approach import Approach
 from cartctl.levels.approach_kernel import steer
 from cartctl.model.limits import Limits
 from cartctl.model.state import State
+from cartctl.solvers import Solver
 from cartctl.tasks.base import Reference, Task
 
 
@@ -46,11 +47,11 @@ class Steering(Approach):
         limits: Limits,
         dt: float,
         scratch: State,
-        scales: bool,
+        solver: Solver,
         waiting: Iterable[Task] = (),
-        reference: bool = True,
     ) -> None:
-        super().__init__(limits, dt, scratch, scales, waiting, reference)
+        super().__init__(limits, dt, scratch, solver, waiting)
+        self._takes_reference = "reference" in solver.honours
         self._at = State(scratch.robot)  # the control point
         self._steer = steer.compiled
 

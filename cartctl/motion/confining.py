@@ -41,9 +41,7 @@ class Confining:
             assert level.bounds is not None
             self._bounds = level.bounds(limits, dt, joints, jerk, robot.dof_names)
             if approach and level.approaching is not None:
-                self._approach = level.approaching(
-                    limits, dt, State(robot), solver.scales, waiting, "reference" in solver.honours
-                )
+                self._approach = level.approaching(limits, dt, State(robot), solver, waiting)
         elif joints or jerk:
             what = "disabled" if joints else "jerk"
             raise ParameterError(f"{what} is given without limits; expected limits= for it to be a part of")
