@@ -43,7 +43,7 @@ class Above:
         if self.calm == math.inf or not J.shape[0]:
             return b
         if not self._ranked:
-            fastest = norm(np.linalg.lstsq(J, b, rcond=_CLEAR)[0])
+            fastest = float(np.linalg.norm(np.linalg.lstsq(J, b, rcond=_CLEAR)[0]))
             return b * (self.calm / fastest) if fastest > self.calm else b
         U, s, Vt = np.linalg.svd(np.concatenate(self._rows))
         rank = int(np.count_nonzero(s > _NO_FREEDOM * s[0])) if s.size else 0
