@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 
 import cartctl as cc
+from cartctl.motion.integrate import advance
 
 RESULTS = Path(__file__).parent / "results" / "rollouts.csv"
 ACCELERATION = 15.0  # rad/s^2, where a robot brings none along
@@ -63,12 +64,9 @@ def rollout(robot, limits, rng, steps, level="velocity", solver="sns"):
         if k % 97 == 0:
             hand.target = rng.normal(size=3) * rng.choice([0.5, 1.5])
         command = controller.step(q, v, k * dt)
-        if level == "velocity":
-            a, v = (command.velocity - v) / dt, command.velocity
-            q = robot.integrate(q, v * dt)
-        else:
-            a = command.acceleration
-            q, v = robot.integrate(q, (v + 0.5 * dt * a) * dt), v + a * dt
+        before = v
+        q, v = advance(robot, q, v, command, dt)
+        a = (v - before) / dt if command.acceleration is None else command.acceleration
         assert np.isfinite(q).all() and np.isfinite(v).all()
         excess.see(limits, position=robot.coordinates(q), velocity=v, acceleration=a)
     return excess

@@ -11,8 +11,8 @@ from scipy.optimize import linprog
 from scipy.spatial import ConvexHull
 
 import cartctl as cc
+from cartctl.braking import allowed_speed
 from cartctl.constraints import Box, PositionConstraint, Rows, stacked
-from cartctl.constraints.braking import allowed_speed
 from cartctl.constraints.curvature import curvatures, joint_order, largest_form, third_order
 from cartctl.constraints.polyhedron import INSIDE_BALL
 from cartctl.errors import CartctlError, FrameNotFound, NonFiniteError, ParameterError, ShapeError

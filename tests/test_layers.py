@@ -19,18 +19,21 @@ FILES = sorted(PACKAGE.rglob("*.py"))
 GROUND = {"errors", "checks", "kernels"}
 ALGEBRA = GROUND | {"algebra"}
 ROBOT = GROUND | {"spatial", "paths", "model"}
-JOINED = ALGEBRA | ROBOT | {"solvers", "tasks", "constraints", "objectives", "analysis", "dynamics", "levels"}
+JOINED = (
+    ALGEBRA | ROBOT | {"braking", "solvers", "tasks", "constraints", "objectives", "analysis", "dynamics", "levels"}
+)
 MAY_IMPORT = {
     "errors": set(),
     "checks": {"errors"},
     "kernels": {"errors", "checks"},
+    "braking": GROUND,
     "algebra": GROUND,
     "solvers": ALGEBRA,
     "spatial": GROUND,
     "paths": GROUND | {"spatial"},
     "model": ROBOT - {"model"},
     "tasks": ROBOT | {"algebra"},
-    "constraints": ROBOT | {"algebra"},
+    "constraints": ROBOT | {"algebra", "braking"},
     "objectives": ROBOT | {"algebra"},
     "analysis": ROBOT | {"algebra", "tasks"},
     "statics": GROUND | {"spatial", "algebra"},

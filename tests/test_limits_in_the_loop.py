@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 import cartctl as cc
 from benchmarks.rollouts import inside, limits_of, rollout
 from cartctl.errors import CartctlError, ParameterError, UnsupportedProblem
+from cartctl.motion.integrate import advance
 from tests import oracles
 
 VIOLATED = 1e-9
@@ -41,12 +42,7 @@ def test_joints_come_back_from_outside_at_a_bounded_rate(level):
             command = controller.step(q, v, k * dt)
             statuses.append(command.solution.status)
             before = v
-            if level == "velocity":
-                v = command.velocity
-                q = robot.integrate(q, v * dt)
-            else:
-                q = robot.integrate(q, (v + 0.5 * dt * command.acceleration) * dt)
-                v = v + dt * command.acceleration
+            q, v = advance(robot, q, v, command, dt)
             assert (np.abs(v) <= limits.velocity_upper + VIOLATED).all()
             assert (np.abs(v - before) <= limits.acceleration_upper * dt + VIOLATED).all()
             if k == 15:
@@ -69,8 +65,7 @@ def test_limits_that_change_while_running():
             fast_at_change = np.abs(v)
         command = controller.step(q, v, k * dt)
         assert (np.abs(command.velocity - v) <= limits.acceleration_upper * dt + VIOLATED).all()
-        v = command.velocity
-        q = robot.integrate(q, v * dt)
+        q, v = advance(robot, q, v, command, dt)
     assert (fast_at_change > 0.3 * limits.velocity_upper).any()  # it was too fast for the new limits
     assert (np.abs(v) <= 0.3 * limits.velocity_upper + VIOLATED).all()
     assert controller.limits is slow
@@ -91,8 +86,7 @@ def test_disabled_joints_stand_still(seed, dt):
     q, v = inside(rng, limits), np.zeros(7)
     start, index = q.copy(), [robot.dof(name) for name in off]
     for k in range(50):
-        v = controller.step(q, v, k * dt).velocity
-        q = robot.integrate(q, v * dt)
+        q, v = advance(robot, q, v, controller.step(q, v, k * dt), dt)
     np.testing.assert_array_equal(q[index], start[index])
     assert np.abs(q - start).max() > 0.0
 

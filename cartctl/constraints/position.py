@@ -21,9 +21,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from cartctl import checks
+from cartctl.braking import allowed_speed
 from cartctl.checks import FloatArray
 from cartctl.constraints.base import Constraint, Rows
-from cartctl.constraints.braking import allowed_speed
 from cartctl.constraints.curvature import curvatures, joint_order, largest_form, third_order
 from cartctl.constraints.intervals import Box, ordered, spread
 from cartctl.model.robot import Robot

@@ -14,8 +14,10 @@ from cartctl.checks import FloatArray
 from cartctl.constraints import Box, Constraint, Rows
 from cartctl.errors import ParameterError, ShapeError, UnsupportedProblem
 from cartctl.levels.acceleration_bounds import AccelerationBounds
+from cartctl.levels.approach import Approach
 from cartctl.levels.base import UNCONFINED, Command, Confines, Level, Secondary, direction, require_finite
 from cartctl.levels.bounds import JointBounds
+from cartctl.levels.steering import Steered, Steering
 from cartctl.model.state import State
 from cartctl.solvers import Solver
 from cartctl.tasks.base import Reference, Task
@@ -30,18 +32,20 @@ class AccelerationLevel(Level):
     gradient.
 
     damping: D >= 0 in 1/s, a number or (nv,), of motion in the null space, which no task slows; needs a solver that
-    honours a reference. The robot has to move by ``q (+) (v dt + a dt^2/2), v + a dt``.
+    honours a reference. None: under limits twice the largest gain (see :mod:`cartctl.levels.steering`), else 0. The
+    robot has to move by ``q (+) (v dt + a dt^2/2), v + a dt``.
 
     Raises ParameterError, NonFiniteError.
     """
 
     name: ClassVar[str] = "acceleration"
     bounds: ClassVar[type[JointBounds] | None] = AccelerationBounds
+    approaching: ClassVar[type[Approach] | None] = Steering
     stable_below: ClassVar[float] = 1.0
 
-    def __init__(self, damping: float | FloatArray = 0.0) -> None:
-        self.damping = _damping(damping)
-        self._damps = bool(np.any(self.damping))
+    def __init__(self, damping: float | FloatArray | None = None) -> None:
+        self.damping = None if damping is None else _damping(damping)
+        self._damps = self.damping is not None and bool(np.any(self.damping))
 
     def check(self, solver: Solver) -> None:
         """Refuse a method that keeps an objective extremal, and damping with one that takes no reference."""
@@ -69,26 +73,35 @@ class AccelerationLevel(Level):
         """The problem of this instant, and the references it was made from; raises NonFiniteError, ShapeError."""
         equations: list[Equation] = []
         references: list[Reference] = []
+        lower, upper, rows, approach = confines
+        steering = approach if isinstance(approach, Steering) else None
+        if steering is not None:
+            steering.begin(state, lower, upper, rows)
         for task, t, anchor in zip(tasks, times, anchors, strict=True):
             reference = task.reference(state, t, anchor)
             J = task.jacobian(state)
             b = require_finite(_commanded(task, reference, J, state.v), f"the command of task {task.name!r}")
             drift = require_finite(task.drift(state), f"the drift of task {task.name!r}")
+            if steering is not None:
+                J, b, drift = steering.steered(task, t, anchor, Steered(J, b, drift))
             equations.append(Equation.trusted(J, b, drift, task.fit, task.weight, task.name, task.size(state)))
             references.append(reference)
-        u0 = self._reference(state, secondary)
-        lower, upper, rows, _ = confines
+        u0 = self._reference(state, secondary, 0.0 if steering is None else steering.damping(tasks))
+        if steering is not None and u0 is not None:
+            u0 = steering.calm_reference(u0, state.v)
         return Problem.trusted(tuple(equations), metric, u0, lower, upper, rows), references
 
-    def _reference(self, state: State, secondary: Secondary) -> FloatArray | None:
-        """``u0 = -k grad H - D v`` (nv,), None where there is neither."""
-        braking = -self._spread(state.robot.nv) * state.v if self._damps else None
+    def _reference(self, state: State, secondary: Secondary, otherwise: float) -> FloatArray | None:
+        """``u0 = -k grad H - D v`` (nv,), None where there is neither; otherwise: D where none was chosen."""
+        D = otherwise if self.damping is None else self._spread(state.robot.nv)
+        braking = -D * state.v if np.any(D) else None
         if secondary.objective is None:
             return braking
         u0 = secondary.share * direction(secondary.objective, state)
         return u0 if braking is None else u0 + braking
 
     def _spread(self, nv: int) -> float | FloatArray:
+        assert self.damping is not None
         if isinstance(self.damping, np.ndarray) and self.damping.shape != (nv,):
             raise ShapeError(f"damping has shape {self.damping.shape}; expected a number or ({nv},)")
         return self.damping

@@ -4,16 +4,20 @@ A feedback K e that ignores how fast joints can slow down overshoots its target,
 a singular value vanishes, a command outwards is followed by reversals for good. Along each singular direction of the
 task's Jacobian, ``J v_i = sigma_i u_i``, with the curvature ``h_i = J_dot(v_i) v_i``:
 
-- the target is ``|u_i . e| / sigma_i`` away, and f of it is the largest speed that stops there at the deceleration a_i
-  that the joints have along v_i (:mod:`cartctl.levels.braking`): ``|u_i . K e| <= sigma_i f(|u_i . e| / sigma_i)``;
-- a target beyond reach pulls by ``-e . h_i > 0``, which adds to the stiffness: one step may not go further than
-  Newton's, ``|u_i . K e| dt <= |u_i . e| sigma_i^2 / (sigma_i^2 - e . h_i / eta)``;
+- a target beyond reach pulls by ``p_i = -e . h_i > 0``, which adds to the stiffness: the target is
+  ``d_i = |u_i . e| sigma_i / (sigma_i^2 + p_i)`` away (without p_i where the solver slows commands down as a whole),
+  and f of it is the largest speed that stops there at the deceleration a_i that the joints have along v_i
+  (:mod:`cartctl.braking`): ``|u_i . K e| <= sigma_i f(d_i)``;
+- one step may not go further than Newton's, ``|u_i . K e| dt <= |u_i . e| sigma_i^2 / (sigma_i^2 + p_i / eta)``;
 - the singular configuration is ``theta_i = sigma_i / |u_i . h_i|`` away: towards it
-  ``|u_i . b| <= sigma_i min(f(theta_i), eta theta_i / dt)``.
+  ``|u_i . b| <= w_i sigma_i min(f(theta_i), eta theta_i / dt)``. ``w_i = 1 - (1e-4 ||J|| / sigma_i)^2`` ends the way
+  some 1e-8 of the arm's length before the edge: what is left to win there is not worth the joints' motion, which
+  never ends where several of them stretch the arm, some much more than others.
 
-What ranks below a task at the edge moves no faster than the last of these, for in the null space, too, the task curves.
-On the way back from the edge, an arm bends the way it was bent before. Joints that a limit keeps from doing their part
-are left out of J. Far from edge and target, nothing is changed.
+What ranks below a task at the edge moves no faster than the last of these, for in the null space, too, the task curves
+(:mod:`cartctl.levels.calming`); it stands where the edge was reached. On the way back from the edge, an arm bends the
+way it was bent before. Joints that a limit, and directions that a row of a constraint keeps from doing their part are
+left out of J. Far from edge and target, nothing is changed.
 """
 
 from __future__ import annotations
@@ -26,9 +30,11 @@ import numpy as np
 
 from cartctl.algebra.svd import scale
 from cartctl.checks import FloatArray
-from cartctl.levels.approach_kernel import ASKED, BEND, FORWARD, PULL, SIGMA, SLOWING, directions, hold
+from cartctl.levels.approach_kernel import ASKED, BEND, FORWARD, PULL, ROWS, SIGMA, SLOWING, directions, hold
+from cartctl.levels.calming import Above
 from cartctl.model.limits import Limits
 from cartctl.model.state import State
+from cartctl.solvers import Solver
 from cartctl.tasks.base import Reference, Task
 
 _SHARE = 0.5  # of the acceleration limits: what one direction may count on
@@ -47,91 +53,113 @@ class Approached(NamedTuple):
     pace: float
 
 
+class Walls(NamedTuple):
+    """What bounds the next velocity: a box, each (nv,), and rows ``c_lower <= C y <= c_upper``."""
+
+    lower: FloatArray
+    upper: FloatArray
+    C: FloatArray
+    c_lower: FloatArray
+    c_upper: FloatArray
+
+
+class Directions(NamedTuple):
+    """The singular directions of a task: U (m, k), Vt (k, nv), their rows of figures D, and the size of J."""
+
+    U: FloatArray
+    Vt: FloatArray
+    D: FloatArray
+    size: float
+
+
 class Approach:
     """For one robot, its limits and a step of dt seconds.
 
-    scales: whether the solver slows commands down as a whole; for others they are kept below the joints' speeds.
+    solver: one that slows commands down as a whole; for others they are kept below the joints' speeds.
     waiting: the tasks whose paths wait for the hand.
     """
 
-    def __init__(self, limits: Limits, dt: float, scratch: State, scales: bool, waiting: Iterable[Task] = ()) -> None:
+    def __init__(
+        self,
+        limits: Limits,
+        dt: float,
+        scratch: State,
+        solver: Solver,
+        waiting: Iterable[Task] = (),
+    ) -> None:
         self._waiting = {id(task) for task in waiting}
         slowing = _SHARE * np.minimum(limits.acceleration_upper, -limits.acceleration_lower)
         speed = np.minimum(limits.velocity_upper, -limits.velocity_lower)
         still = _AT_REST * np.where(np.isfinite(speed), speed, 1.0)
         self._joints = np.array([slowing, speed, still])
-        self._dt, self._scratch, self._scales = dt, scratch, scales
+        self._dt, self._scratch, self._scales = dt, scratch, solver.scales
         self._bent: dict[int, FloatArray] = {}  # by task: the motion inwards, when it was last clear
+        self._above, self._walls = (
+            Above(ranked=not solver.stacks),
+            Walls(_NOTHING, _NOTHING, np.zeros((0, 0)), _NOTHING, _NOTHING),
+        )
         self._directions, self._hold = directions.compiled, hold.compiled
 
-    def command(
+    def begin(
         self,
-        task: Task,
         state: State,
-        J: FloatArray,
-        reference: Reference,
-        b: FloatArray,
         lower: FloatArray | None,
         upper: FloatArray | None,
-        calm: float,
-    ) -> Approached:
-        """``b`` (m,) held back along directions in which the robot could not stop in time.
+        rows: tuple[FloatArray, FloatArray, FloatArray] | None,
+    ) -> None:
+        """Begin a step at ``state`` under a box and rows on u; the tasks follow, highest priority first."""
+        self._above.clear()
+        C, c_lower, c_upper = (np.zeros((0, state.v.shape[0])), _NOTHING, _NOTHING) if rows is None else rows
+        low, high = (_NOTHING, _NOTHING) if lower is None or upper is None else (lower, upper)
+        self._walls = Walls(low, high, C, c_lower, c_upper)
 
-        calm: the largest speed of joints, in the norm of v, that the tasks above leave to this one.
-        """
+    def command(self, task: Task, state: State, J: FloatArray, reference: Reference, b: FloatArray) -> Approached:
+        """``b`` (m,) held back along directions in which the robot could not stop in time."""
         edge, pace = math.inf, 1.0
         if J.shape[0] and task.fit == "scale":
-            b, edge, pace = self._held(task, state, J, reference, b, lower, upper)
-        return Approached(b if calm == math.inf else calmed(J, b, calm), min(calm, edge), pace)
+            b, edge, pace = self._held(task, state, J, reference, b)
+        b = self._above.calmed(J, b)
+        self._above.add(J, b, edge)
+        return Approached(b, self._above.calm, pace)
 
-    def _held(
-        self,
-        task: Task,
-        state: State,
-        J: FloatArray,
-        reference: Reference,
-        b: FloatArray,
-        lower: FloatArray | None,
-        upper: FloatArray | None,
-    ) -> Approached:
+    def _held(self, task: Task, state: State, J: FloatArray, reference: Reference, b: FloatArray) -> Approached:
+        found = self._along(task, state, J, reference, b, _NOTHING)
+        U, Vt, D, size = found
+        out, pace = np.empty(J.shape[0]), 1.0
+        if id(task) in self._waiting and reference.rate is not None and reference.acceleration is not None:
+            pace = self._pace(task, state, found, reference)
+            b = b - (1.0 - pace) * reference.rate
+            D[FORWARD] *= pace
+        edge = self._hold(b, U, D, self._dt, size, self._scales, out)
+        if D.shape[1] and D[BEND, -1] != 0.0:
+            self._bend_as_before(task, U[:, -1], Vt[-1], D[:, -1], size, out)
+        return Approached(out, edge, pace)
+
+    def _along(
+        self, task: Task, state: State, J: FloatArray, reference: Reference, b: FloatArray, y: FloatArray
+    ) -> Directions:
+        """The singular directions, their curvatures where these matter."""
         (m, n), size = J.shape, scale(J)
         k = min(m, n)
-        U, Vt, D, out = np.empty((m, k)), np.empty((k, n)), np.empty((9, k)), np.empty(m)
-        rate = _NOTHING if reference.rate is None else reference.rate
-        low, high, bounded = (_NOTHING, _NOTHING, False) if lower is None or upper is None else (lower, upper, True)
-        error = reference.error
-        self._directions(J, b, rate, error, self._joints, low, high, self._dt, size, bounded, U, Vt, D)
+        U, Vt, D = np.empty((m, k)), np.empty((k, n)), np.empty((ROWS, k))
+        rate, error = _NOTHING if reference.rate is None else reference.rate, reference.error
+        bounded = self._walls.lower.shape[0] > 0
+        self._directions(J, b, y, rate, error, self._joints, *self._walls, self._dt, size, bounded, U, Vt, D)
         for i in np.flatnonzero(D[ASKED]):
             self._scratch.set(state.q, Vt[i])
             h = task.drift(self._scratch)
             D[BEND, i], D[PULL, i] = U[:, i] @ h, max(0.0, -float(error @ h))
-        pace = 1.0
-        if id(task) in self._waiting and reference.rate is not None and reference.acceleration is not None:
-            pace = self._pace(task, state, U, D[SIGMA], Vt, reference, size)
-            b = b - (1.0 - pace) * reference.rate
-            D[FORWARD] *= pace
-        edge = self._hold(b, U, D, self._dt, size, self._scales, out)
-        if k and D[BEND, k - 1] != 0.0:
-            self._bend_as_before(task, U[:, k - 1], Vt[k - 1], D[:, k - 1], size, out)
-        return Approached(out, edge, pace)
+        return Directions(U, Vt, D, size)
 
-    def _pace(
-        self,
-        task: Task,
-        state: State,
-        U: FloatArray,
-        s: FloatArray,
-        Vt: FloatArray,
-        reference: Reference,
-        size: float,
-    ) -> float:
+    def _pace(self, task: Task, state: State, found: Directions, reference: Reference) -> float:
         """The share of its speed at which the joints' accelerations can follow the path's bends.
 
         At the share p they are p^2 times those at full speed, ``J a = r_ddot - J_dot(v) v`` with ``J v = r_dot``.
         """
         rate, acceleration = reference.rate, reference.acceleration
         assert rate is not None and acceleration is not None
-        solve = (Vt.T * (s / (s * s + (_CLEAR * size) ** 2))) @ U.T
+        s = found.D[SIGMA]
+        solve = (found.Vt.T * (s / (s * s + (_CLEAR * found.size) ** 2))) @ found.U.T
         self._scratch.set(state.q, solve @ rate)
         bend = np.abs(solve @ (acceleration - task.drift(self._scratch)))
         with np.errstate(divide="ignore"):
@@ -152,12 +180,11 @@ class Approach:
             through = 2.0 * d[SIGMA] * d[SIGMA] / (abs(d[BEND]) * self._dt)
             out -= u * (asked + np.copysign(through, asked))
 
+    def slowed(self, u: FloatArray) -> FloatArray:
+        """What is wanted of the null space, no faster than the tasks leave to it."""
+        return self._above.slowed(u)
+
     def reset(self) -> None:
         """Forget how the arm was bent."""
         self._bent.clear()
-
-
-def calmed(J: FloatArray, b: FloatArray, calm: float) -> FloatArray:
-    """``b`` slowed down until the least motion that delivers it is no faster than ``calm`` in the norm of v."""
-    fastest = float(np.linalg.norm(np.linalg.lstsq(J, b, rcond=1e-6)[0]))
-    return b * (calm / fastest) if fastest > calm else b
+        self._above.clear()

@@ -4,37 +4,43 @@ from __future__ import annotations
 
 import numpy as np
 
+from cartctl.braking import clamp, fastest
 from cartctl.checks import FloatArray
 from cartctl.kernels import kernel, part
-from cartctl.levels.braking import clamp, fastest
+from cartctl.levels.left_out import leave_out
 
 # Rows of the joints' array.
 SLOWING, TOP_SPEED, STILL = 0, 1, 2
 
 # Rows of the directions' array, one column a singular direction.
-SIGMA, FORWARD, FEEDBACK, ERROR, AVAILABLE, SPEED, BEND, PULL, ASKED = 0, 1, 2, 3, 4, 5, 6, 7, 8
+SIGMA, FORWARD, FEEDBACK, ERROR, AVAILABLE, SPEED, BEND, PULL, ASKED, NEXT = 0, 1, 2, 3, 4, 5, 6, 7, 8, 9
+ROWS = 10
 
 ETA = 0.5  # of the way to a singular configuration in one step
 _NOTHING = 1e-12  # of the Jacobian's size: no direction at all
-_EDGE = 1e-7  # of the Jacobian's size: as near to the edge of the workspace as a command may lead
+_WORTH = 1e-4  # of the Jacobian's size: below this singular value there is nothing left to win further outwards
 _CURVED = 4.0  # of the Jacobian's size: what the curvature along a unit motion stays below
 _NOTICED = 0.1  # of what a direction may carry: from here on, what ranks below is kept calm
 _PULLED = 10.0  # of sigma^2: a target this far beyond the edge keeps what ranks below calm, too
-_WANTED = 1e-3  # of the Jacobian's size: damping of the motion that says which joints are wanted
+_STIFF = 0.25  # of sigma^2: a target this far beyond the edge would make a critically damped loop ring
 
 
 @kernel(
-    "void(matrix, vector, vector, vector, matrix, vector, vector, float, float, bool, out_matrix, out_matrix, "
-    "out_matrix)"
+    "void(matrix, vector, vector, vector, vector, matrix, vector, vector, matrix, vector, vector, float, float, bool, "
+    "out_matrix, out_matrix, out_matrix)"
 )
 def directions(
     J: FloatArray,
     b: FloatArray,
+    y: FloatArray,
     rate: FloatArray,
     error: FloatArray,
     joints: FloatArray,
     lower: FloatArray,
     upper: FloatArray,
+    C: FloatArray,
+    c_lower: FloatArray,
+    c_upper: FloatArray,
     dt: float,
     size: float,
     bounded: bool,
@@ -42,10 +48,10 @@ def directions(
     Vt: FloatArray,
     D: FloatArray,
 ) -> None:
-    """Fill U (m, k), Vt (k, n) and D (9, k): what each singular direction of J is asked and has to do it with.
+    """Fill U (m, k), Vt (k, n) and D (10, k): what each singular direction of J is asked and has to do it with.
 
-    D[ASKED] says whether the direction's curvature matters. rate may be empty. Joints whose bounds keep them from
-    doing their part are left out of J.
+    D[ASKED] says whether the direction's curvature matters. y, the next velocity where that is another than b, and
+    rate may be empty. Joints and rows of C whose bounds keep them from doing their part are left out of J.
     """
     m, n = J.shape
     A = np.empty((m, n))
@@ -53,17 +59,18 @@ def directions(
         for j in range(n):
             A[i, j] = J[i, j]
     left, s, right = np.linalg.svd(A, full_matrices=False)
-    if bounded and _leave_out(A, left, s, right, b, joints, lower, upper, size):
+    if bounded and leave_out(A, left, s, right, b, joints, lower, upper, C, c_lower, c_upper, size):
         left, s, right = np.linalg.svd(A, full_matrices=False)
     far = 0.0
     for i in range(m):
         far += error[i] * error[i]
     far = np.sqrt(far)
     for k in range(s.shape[0]):
-        forward, total, e = 0.0, 0.0, 0.0
+        forward, total, following, e = 0.0, 0.0, 0.0, 0.0
         for i in range(m):
             U[i, k] = left[i, k]
             forward += left[i, k] * rate[i] if rate.shape[0] > 0 else 0.0
+            following += left[i, k] * y[i] if y.shape[0] > 0 else 0.0
             total += left[i, k] * b[i]
             e += left[i, k] * error[i]
         available, speed = np.inf, np.inf
@@ -74,49 +81,23 @@ def directions(
                 available = min(available, joints[SLOWING, j] / share)
                 speed = min(speed, joints[TOP_SPEED, j] / share)
         D[SIGMA, k], D[FORWARD, k], D[FEEDBACK, k], D[ERROR, k] = s[k], forward, total - forward, abs(e)
-        D[AVAILABLE, k], D[SPEED, k], D[BEND, k], D[PULL, k] = available, speed, 0.0, 0.0
-        D[ASKED, k] = 1.0 if s[k] > _NOTHING * size and _matters(D[:, k], far, size, dt) else 0.0
+        D[AVAILABLE, k], D[SPEED, k], D[BEND, k], D[PULL, k], D[NEXT, k] = available, speed, 0.0, 0.0, following
+        asked = _matters(D[:, k], total - forward, far, size, dt)
+        if y.shape[0] > 0:
+            asked = asked or _matters(D[:, k], following - forward, far, size, dt)
+        D[ASKED, k] = 1.0 if asked and s[k] > _NOTHING * size else 0.0
 
 
 @part
-def _leave_out(
-    A: FloatArray,
-    left: FloatArray,
-    s: FloatArray,
-    right: FloatArray,
-    b: FloatArray,
-    joints: FloatArray,
-    lower: FloatArray,
-    upper: FloatArray,
-    size: float,
-) -> bool:
-    """Zero the columns of joints that are wanted beyond where their bounds let them go."""
-    found = False
-    for j in range(A.shape[1]):
-        still = joints[STILL, j]
-        if upper[j] > still and lower[j] < -still:
-            continue
-        wanted = 0.0
-        for k in range(s.shape[0]):
-            t = 0.0
-            for i in range(A.shape[0]):
-                t += left[i, k] * b[i]
-            wanted += right[k, j] * t * s[k] / (s[k] * s[k] + (_WANTED * size) ** 2)
-        if (wanted > 0.0 and upper[j] <= still) or (wanted < 0.0 and lower[j] >= -still):
-            for i in range(A.shape[0]):
-                A[i, j] = 0.0
-            found = True
-    return found
-
-
-@part
-def _matters(d: FloatArray, far: float, size: float, dt: float) -> bool:
+def _matters(d: FloatArray, feedback: float, far: float, size: float, dt: float) -> bool:
     """Whether the largest possible curvature would hold back this direction, or what ranks below it."""
-    s, total, curved = d[SIGMA], abs(d[FORWARD] + d[FEEDBACK]), _CURVED * size
+    s, total, curved = d[SIGMA], abs(d[FORWARD] + feedback), _CURVED * size
     squared = s * s
     if curved * far > _PULLED * squared:
         return True
-    if abs(d[FEEDBACK]) * dt * (squared + curved * far / ETA) > d[ERROR] * squared:
+    if abs(feedback) * dt * (squared + curved * far / ETA) > d[ERROR] * squared:
+        return True
+    if abs(feedback) > s * fastest(d[ERROR] * s / (squared + curved * far), d[AVAILABLE], dt):
         return True
     theta = s / curved
     most = s * min(ETA * theta / dt, fastest(theta, d[AVAILABLE], dt))
@@ -126,29 +107,75 @@ def _matters(d: FloatArray, far: float, size: float, dt: float) -> bool:
 @kernel("float(vector, matrix, matrix, float, float, bool, out_vector)")
 def hold(b: FloatArray, U: FloatArray, D: FloatArray, dt: float, size: float, scales: bool, out: FloatArray) -> float:
     """Fill out (m,) with what of b the robot can still stop; the speed of joints left to what ranks below."""
-    m, calm = b.shape[0], np.inf
-    for i in range(m):
-        out[i] = b[i]
+    calm, held, allowed = np.inf, False, np.zeros(D.shape[1])
+    asked = D[FORWARD] + D[FEEDBACK]
     for k in range(D.shape[1]):
         d = D[:, k]
-        asked = d[FORWARD] + d[FEEDBACK]
-        allowed = 0.0
         if d[SIGMA] > _NOTHING * size:
-            allowed, quiet = _allowed(d, dt, size, scales)
+            # a method that scales would slow all directions down for the nearness of one
+            pull = 0.0 if scales else d[PULL]
+            most = min(_stoppable(d, pull, dt), _newton(d, dt))
+            total = clamp(d[FEEDBACK], -most, most) + d[FORWARD]
+            allowed[k], quiet = _before_the_edge(d, total, dt, size, scales)
             calm = min(calm, quiet)
-        if allowed != asked:
-            for i in range(m):
-                out[i] += U[i, k] * (allowed - asked)
+        held = held or allowed[k] != asked[k]
+    _put_together(b, U, asked, allowed, held, out)
+    return calm
+
+
+@kernel("float(vector, vector, matrix, matrix, float, float, bool, out_vector)")
+def steer(
+    y: FloatArray,
+    gain: FloatArray,
+    U: FloatArray,
+    D: FloatArray,
+    dt: float,
+    size: float,
+    scales: bool,
+    out: FloatArray,
+) -> float:
+    """Fill out (m,) with what of the next velocity y, reached by acceleration, can still be stopped; the calm left.
+
+    D[FEEDBACK] is the velocity wanted, which y follows at the rate ``2 gain`` (m,): held back where the way is too
+    short, and y itself at the edge, and where the pull of a target out of reach would make the loop ring.
+    """
+    calm, held, allowed = np.inf, False, np.zeros(D.shape[1])
+    asked = D[NEXT].copy()
+    for k in range(D.shape[1]):
+        d = D[:, k]
+        if d[SIGMA] > _NOTHING * size:
+            most, following, k_d = _stoppable(d, d[PULL], dt), asked[k], 0.0
+            for i in range(y.shape[0]):
+                k_d += 2.0 * gain[i] * U[i, k] * U[i, k]
+            following += dt * k_d * (clamp(d[FEEDBACK], -most, most) - d[FEEDBACK])
+            if d[PULL] > _STIFF * d[SIGMA] * d[SIGMA]:
+                most = min(most, _newton(d, dt))
+                following = clamp(following - d[FORWARD], -most, most) + d[FORWARD]
+            allowed[k], quiet = _before_the_edge(d, following, dt, size, scales)
+            calm = min(calm, quiet)
+        held = held or allowed[k] != asked[k]
+    _put_together(y, U, asked, allowed, held, out)
     return calm
 
 
 @part
-def _allowed(d: FloatArray, dt: float, size: float, scales: bool) -> tuple[float, float]:
-    """What a direction may carry, and the speed of joints that does not spoil it."""
-    s, e, a = d[SIGMA], d[ERROR], d[AVAILABLE]
-    squared = s * s
-    most = min(s * fastest(e / s, a, dt), e / dt * squared / (squared + d[PULL] / ETA))
-    total = clamp(d[FEEDBACK], -most, most) + d[FORWARD]
+def _stoppable(d: FloatArray, pull: float, dt: float) -> float:
+    """The largest speed that stops at the target; its pull brings a target beyond reach nearer."""
+    s = d[SIGMA]
+    return s * fastest(d[ERROR] * s / (s * s + pull), d[AVAILABLE], dt)  # type: ignore[no-any-return]
+
+
+@part
+def _newton(d: FloatArray, dt: float) -> float:
+    """The speed of one Newton step."""
+    squared = d[SIGMA] * d[SIGMA]
+    return d[ERROR] / dt * squared / (squared + d[PULL] / ETA)  # type: ignore[no-any-return]
+
+
+@part
+def _before_the_edge(d: FloatArray, total: float, dt: float, size: float, scales: bool) -> tuple[float, float]:
+    """What a direction may carry of ``total``, and the speed of joints that does not spoil it."""
+    s, a = d[SIGMA], d[AVAILABLE]
     if not scales:  # a method that scales slows all directions alike; others would bend the command
         total = clamp(total, -s * d[SPEED], s * d[SPEED])
     if d[BEND] == 0.0:
@@ -157,8 +184,26 @@ def _allowed(d: FloatArray, dt: float, size: float, scales: bool) -> tuple[float
     most = s * ETA * theta / dt
     outwards = total * d[BEND] < 0.0
     if outwards:
-        most = 0.0 if s < _EDGE * size else min(most, s * fastest(theta, a, dt))
+        worth = max(0.0, 1.0 - (_WORTH * size) ** 2 / (s * s))
+        most = worth * min(most, s * fastest(theta, a, dt))
     calm = np.inf
-    if (outwards and abs(total) > _NOTICED * most) or d[PULL] > _PULLED * squared:
+    if (outwards and abs(total) > _NOTICED * most) or d[PULL] > _PULLED * s * s:
         calm = most / s
     return clamp(total, -most, most), calm
+
+
+@part
+def _put_together(
+    b: FloatArray, U: FloatArray, asked: FloatArray, allowed: FloatArray, held: bool, out: FloatArray
+) -> None:
+    """Fill out (m,) with b, changed from asked to allowed along the directions.
+
+    Put together, not taken away: the round-off of what is held back would be moved by joints, over sigma.
+    """
+    m, k = U.shape
+    for i in range(m):
+        carried, rest = 0.0, b[i]
+        for j in range(k):
+            carried += U[i, j] * allowed[j]
+            rest -= U[i, j] * asked[j]
+        out[i] = b[i] if not held else carried if k == m else carried + rest

@@ -84,6 +84,7 @@ class Level(ABC):
 
     name: ClassVar[str]
     bounds: ClassVar[type[JointBounds] | None] = None  # what turns a robot's limits into bounds on u
+    approaching: ClassVar[type[Approach] | None] = None  # what keeps commands such that the robot can still stop
     clocked: ClassVar[bool] = False  # whether a path may wait for a hand that was slowed down
     stable_below: ClassVar[float] = 2.0  # gain times dt, from which on the sampled loop diverges
 

@@ -12,9 +12,9 @@ that forces the joint back is the largest a+ whose manoeuvre ends there.
 
 from __future__ import annotations
 
+from cartctl.braking import clamp
 from cartctl.checks import FloatArray
 from cartctl.kernels import kernel
-from cartctl.levels.braking import clamp
 from cartctl.levels.jerk_manoeuvre import furthest, headroom, stopping
 from cartctl.levels.velocity_kernel import SLACK
 

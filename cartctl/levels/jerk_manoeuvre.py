@@ -14,8 +14,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from cartctl.braking import clamp, fastest
 from cartctl.kernels import part
-from cartctl.levels.braking import clamp, fastest
 
 _STANDS = 1e-16  # rad/s or m/s; below any round-off that matters
 _LONGEST = 1_000_000  # samples of one manoeuvre: an end to the loop for a state that is not finite

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import Any, ClassVar
 
 from cartctl.algebra.problem import Equation, Problem
 from cartctl.algebra.solution import Solution
-from cartctl.algebra.svd import norm
 from cartctl.checks import FloatArray
 from cartctl.constraints import Box, Constraint, Rows
+from cartctl.levels.approach import Approach
 from cartctl.levels.base import UNCONFINED, Command, Confines, Level, Secondary, direction, require_finite
 from cartctl.levels.bounds import JointBounds
 from cartctl.levels.extremal import extremal_rows
@@ -25,6 +24,7 @@ class VelocityLevel(Level):
 
     name: ClassVar[str] = "velocity"
     bounds: ClassVar[type[JointBounds] | None] = VelocityBounds
+    approaching: ClassVar[type[Approach] | None] = Approach
     clocked: ClassVar[bool] = True
 
     def __init__(self) -> None:
@@ -44,7 +44,8 @@ class VelocityLevel(Level):
         equations: list[Equation] = []
         references: list[Reference] = []
         lower, upper, rows, approach = confines
-        calm = math.inf
+        if approach is not None:
+            approach.begin(state, lower, upper, rows)
         for task, t, anchor in zip(tasks, times, anchors):  # noqa: B905 - equally long by construction, in a hot loop
             reference = task.reference(state, t, anchor)
             b = task.gain * reference.error
@@ -53,7 +54,7 @@ class VelocityLevel(Level):
             require_finite(b, f"the command of task {task.name!r}")
             J, size = task.jacobian(state), task.size(state)
             if approach is not None:
-                b, calm, pace = approach.command(task, state, J, reference, b, lower, upper, calm)
+                b, _, pace = approach.command(task, state, J, reference, b)
                 reference = reference if pace == 1.0 else reference._replace(pace=pace)
             equations.append(Equation.trusted(J, b, None, task.fit, task.weight, task.name, size))
             references.append(reference)
@@ -64,8 +65,8 @@ class VelocityLevel(Level):
             equations.append(self._extremal(state, tasks, objective, secondary.extend))
             return Problem.trusted(tuple(equations), metric, None, lower, upper, rows), references
         u0 = secondary.share * direction(objective, state)
-        if calm < math.inf:
-            u0 = u0 * min(1.0, calm / max(norm(u0), calm))
+        if approach is not None:
+            u0 = approach.slowed(u0)
         return Problem.trusted(tuple(equations), metric, u0, lower, upper, rows), references
 
     def _extremal(self, state: State, tasks: Sequence[Task], objective: Objective, gain: float) -> Equation:

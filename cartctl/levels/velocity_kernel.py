@@ -6,9 +6,9 @@ level (y = u), ``p = q + v dt/2`` at the acceleration level (y = v + u dt). See 
 
 from __future__ import annotations
 
+from cartctl.braking import approach, clamp
 from cartctl.checks import FloatArray
 from cartctl.kernels import kernel
-from cartctl.levels.braking import approach, clamp
 
 SLACK = 1e-9  # rad, m and per s: what counts as outside; far above round-off, far below what matters
 

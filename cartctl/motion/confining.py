@@ -40,9 +40,8 @@ class Confining:
         if limits is not None:
             assert level.bounds is not None
             self._bounds = level.bounds(limits, dt, joints, jerk, robot.dof_names)
-            self._approach = (
-                Approach(limits, dt, State(robot), solver.scales, waiting) if approach and level.clocked else None
-            )
+            if approach and level.approaching is not None:
+                self._approach = level.approaching(limits, dt, State(robot), solver, waiting)
         elif joints or jerk:
             what = "disabled" if joints else "jerk"
             raise ParameterError(f"{what} is given without limits; expected limits= for it to be a part of")

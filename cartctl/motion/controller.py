@@ -44,7 +44,7 @@ class Controller:
     constraints: Constraints such as ``cc.FrameBox(...)``. disabled: names of joints that brake and stand still. jerk:
     whether ``limits.jerk_*`` are kept, too. path_clock: whether a path waits for a hand that is slowed down, so that it
     stays on its path; by default where the solver scales, at the velocity level. approach: whether commands are held
-    back, under limits at the velocity level, so that the robot can stop at its target and at the edge of its reach.
+    back, under limits, so that the robot can stop at its target, at the edge of its reach and at the constraints.
 
     Raises NoTasksError, ProblemError, TimeStepError, FrameNotFound, JointNotFound, SolverNotFound, LevelNotFound,
     UnsupportedProblem, MetricError, ParameterError, NonFiniteError.

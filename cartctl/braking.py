@@ -1,4 +1,4 @@
-"""How fast a joint may move at a distance from where it has to stand: the formula under all joint bounds.
+"""How fast one may move at a distance from where one has to stand: the formula under all bounds on positions.
 
 A joint that moves by ``q+ = q + u dt`` and slows down by at most ``c dt`` a step travels
 ``sum_j max(u - j c dt, 0) dt`` until it stands, u the speed of the first step. With ``w = u/(c dt)`` the sum has
@@ -7,12 +7,17 @@ is the largest of these lines in w over all k, so the largest w is the smallest 
 ``(X + k (k + 1)/2)/(k + 1)``, taken at
 ``k = floor((sqrt(1 + 8 X) - 1)/2)``. After a step at that speed the formula, at the distance left, says ``u - c dt``:
 it reaches the end exactly, at rest, after k + 1 steps, and a neighbouring k (round-off) gives the same to round-off.
+(The usual sqrt(2 c d) is not viable in discrete time: it comes too late by up to a whole step.)
+
+Where the speed changes within a step (acceleration commands), one from s to y covers ``(s + y) dt/2``: the same with
+``d - s dt/2`` for d.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
+from cartctl.checks import FloatArray
 from cartctl.kernels import part
 
 
@@ -42,6 +47,14 @@ def approach(distance: float, slowing: float, returning: float, ceiling: float, 
     if distance >= 0.0:
         return fastest(distance, slowing, dt)
     return -min(fastest(-distance, returning, dt), ceiling)
+
+
+def allowed_speed(distance: FloatArray, deceleration: float, dt: float) -> FloatArray:
+    """:func:`fastest` for each of ``distance`` (k,), m, negative ones as 0; inf where that is inf. (k,), m/s.
+
+    Never above distance / dt, so that no step crosses, and falling by at most ``deceleration`` dt a step.
+    """
+    return np.array([fastest(max(d, 0.0), deceleration, dt) for d in distance.tolist()])
 
 
 @part

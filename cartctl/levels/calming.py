@@ -1,0 +1,61 @@
+"""What ranks below a task at the edge of the workspace, kept so calm that the edge stays where it is.
+
+With N the null space of the tasks above and v_a the least motion that does what they ask, a task below takes
+``J N w = b - J v_a``. At the edge J N may lose rank, and what little of a direction is left would be paid for with any
+speed; so ``|w_i| <= calm`` for each singular direction of J N, then ``||w|| <= calm``. A solver that weighs tasks
+instead of ranking them has nothing above: there, b is slowed down as it is.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from cartctl.algebra.svd import norm
+from cartctl.checks import FloatArray
+
+_NO_FREEDOM = 1e-9  # of the largest: singular values of the tasks above below this leave a motion free
+_CLEAR = 1e-6  # of the largest: singular values below this are none
+
+
+class Above:
+    """The tasks above, in this step: their J and b, and the largest speed, in the norm of v, that they leave."""
+
+    def __init__(self, ranked: bool) -> None:
+        self._ranked = ranked
+        self.clear()
+
+    def clear(self) -> None:
+        """Begin with the highest priority."""
+        self._rows: list[FloatArray] = []
+        self._asked: list[FloatArray] = []
+        self.calm = math.inf
+
+    def add(self, J: FloatArray, b: FloatArray, calm: float) -> None:
+        """One more task, which leaves ``calm``."""
+        self._rows.append(J)
+        self._asked.append(b)
+        self.calm = min(self.calm, calm)
+
+    def calmed(self, J: FloatArray, b: FloatArray) -> FloatArray:
+        """``b`` (m,) slowed down until the motion that the tasks above leave to it is no faster than calm."""
+        if self.calm == math.inf or not J.shape[0]:
+            return b
+        if not self._ranked:
+            fastest = float(np.linalg.norm(np.linalg.lstsq(J, b, rcond=_CLEAR)[0]))
+            return b * (self.calm / fastest) if fastest > self.calm else b
+        U, s, Vt = np.linalg.svd(np.concatenate(self._rows))
+        rank = int(np.count_nonzero(s > _NO_FREEDOM * s[0])) if s.size else 0
+        given = Vt[:rank].T @ ((U[:, :rank].T @ np.concatenate(self._asked)) / s[:rank])
+        L, t, _ = np.linalg.svd(J @ Vt[rank:].T, full_matrices=False)
+        base = J @ given
+        left = np.minimum(np.maximum(L.T @ (b - base), -self.calm * t), self.calm * t)
+        fastest = float(np.linalg.norm(left[t > 0.0] / t[t > 0.0]))
+        slowed: FloatArray = base + L @ left * (self.calm / fastest if fastest > self.calm else 1.0)
+        return slowed
+
+    def slowed(self, u: FloatArray) -> FloatArray:
+        """A motion of the null space (nv,), no faster than calm."""
+        fastest = norm(u)
+        return u * (self.calm / fastest) if fastest > self.calm else u
