@@ -42,6 +42,10 @@ class UnsupportedProblem(CartctlError, ValueError):  # noqa: N818 - the public n
     """The chosen solver cannot honour something in the problem, and says so instead of ignoring it."""
 
 
+class UnderactuatedRobot(CartctlError, ValueError):  # noqa: N818 - names what the robot is
+    """Torques are asked of a robot that moves in ways no motor drives, or whose inertia matrix is singular."""
+
+
 class SolverOutputError(CartctlError, ValueError):
     """A solver of the user's returned something else than (n,) finite numbers."""
 

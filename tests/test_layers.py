@@ -19,7 +19,7 @@ FILES = sorted(PACKAGE.rglob("*.py"))
 GROUND = {"errors", "checks", "kernels"}
 ALGEBRA = GROUND | {"algebra"}
 ROBOT = GROUND | {"spatial", "paths", "model"}
-JOINED = ALGEBRA | ROBOT | {"solvers", "tasks", "constraints", "objectives", "analysis", "levels"}
+JOINED = ALGEBRA | ROBOT | {"solvers", "tasks", "constraints", "objectives", "analysis", "dynamics", "levels"}
 MAY_IMPORT = {
     "errors": set(),
     "checks": {"errors"},
@@ -33,6 +33,7 @@ MAY_IMPORT = {
     "constraints": ROBOT | {"algebra"},
     "objectives": ROBOT | {"algebra"},
     "analysis": ROBOT | {"algebra", "tasks"},
+    "dynamics": ROBOT | {"algebra"},
     "levels": JOINED - {"levels"},
     "files": {"errors"},
     "motion": JOINED | {"files"},

@@ -12,11 +12,15 @@ from cartctl.algebra.problem import Equation, Problem
 from cartctl.algebra.solution import Solution
 from cartctl.checks import FloatArray
 from cartctl.constraints import Box, Constraint, Rows
+from cartctl.dynamics.friction import Friction
 from cartctl.errors import ParameterError, ShapeError, UnsupportedProblem
 from cartctl.levels.acceleration_bounds import AccelerationBounds
-from cartctl.levels.base import UNCONFINED, Command, Confines, Level, Secondary, direction, require_finite
+from cartctl.levels.base import UNCONFINED, Command, Confines, Level, Motion, Secondary, direction, require_finite
 from cartctl.levels.bounds import JointBounds
+from cartctl.levels.loads import Loads, actuated, later
+from cartctl.levels.torque_bounds import torque_rows
 from cartctl.model.state import State
+from cartctl.model.wrench import Wrench
 from cartctl.solvers import Solver
 from cartctl.tasks.base import Reference, Task
 
@@ -32,16 +36,27 @@ class AccelerationLevel(Level):
     damping: D >= 0 in 1/s, a number or (nv,), of motion in the null space, which no task slows; needs a solver that
     honours a reference. The robot has to move by ``q (+) (v dt + a dt^2/2), v + a dt``.
 
-    Raises ParameterError, NonFiniteError.
+    Bounds on torques are rows ``lower - h <= M a <= upper - h``, where limits are in force, hold any, and every
+    coordinate has a motor. friction, wrenches: what h knows of beside the robot's own (:mod:`cartctl.levels.loads`).
+    Limits that contradict each other yield in the order of :mod:`cartctl.levels.yielding`.
+
+    Raises ParameterError, NonFiniteError; ShapeError, FrameNotFound when a controller is made.
     """
 
     name: ClassVar[str] = "acceleration"
     bounds: ClassVar[type[JointBounds] | None] = AccelerationBounds
     stable_below: ClassVar[float] = 1.0
 
-    def __init__(self, damping: float | FloatArray = 0.0) -> None:
-        self.damping = _damping(damping)
+    def __init__(
+        self,
+        damping: float | FloatArray = 0.0,
+        *,
+        friction: Friction | None = None,
+        wrenches: Wrench | Sequence[Wrench] = (),
+    ) -> None:
+        self.damping = damping_of(damping)
         self._damps = bool(np.any(self.damping))
+        self.loads: Loads = Loads(friction, wrenches)
 
     def check(self, solver: Solver) -> None:
         """Refuse a method that keeps an objective extremal, and damping with one that takes no reference."""
@@ -77,33 +92,38 @@ class AccelerationLevel(Level):
             equations.append(Equation.trusted(J, b, drift, task.fit, task.weight, task.name, task.size(state)))
             references.append(reference)
         u0 = self._reference(state, secondary)
-        lower, upper, rows, _ = confines
-        return Problem.trusted(tuple(equations), metric, u0, lower, upper, rows), references
+        rows = (
+            confines.rows if confines.torque is None else torque_rows(self.loads, state, confines.rows, confines.torque)
+        )
+        return Problem.trusted(tuple(equations), metric, u0, confines.lower, confines.upper, rows), references
 
     def _reference(self, state: State, secondary: Secondary) -> FloatArray | None:
         """``u0 = -k grad H - D v`` (nv,), None where there is neither."""
-        braking = -self._spread(state.robot.nv) * state.v if self._damps else None
+        braking = -spread_over(self.damping, state.robot.nv) * state.v if self._damps else None
         if secondary.objective is None:
             return braking
         u0 = secondary.share * direction(secondary.objective, state)
         return u0 if braking is None else u0 + braking
 
-    def _spread(self, nv: int) -> float | FloatArray:
-        if isinstance(self.damping, np.ndarray) and self.damping.shape != (nv,):
-            raise ShapeError(f"damping has shape {self.damping.shape}; expected a number or ({nv},)")
-        return self.damping
-
     def rows(self, constraint: Constraint, state: State, dt: float, box: Box | None) -> Rows:
         """The rows of a constraint on a."""
         return constraint.acceleration_rows(state, dt, box)
+
+    def motion(self, state: State) -> Motion:
+        """U is the acceleration; torques are ``M a + h``."""
+        n = state.robot.nv
+        return Motion(np.eye(n), np.zeros(n), state.mass_matrix, self.loads.effects(state))
 
     def stopping(self, state: State, dt: float) -> FloatArray:
         """``-v/dt``."""
         return -state.v / dt
 
-    def command(self, solution: Solution, references: Sequence[Reference]) -> Command:
-        """U is the acceleration."""
-        return Command(solution, references, acceleration=solution.u)
+    def command(self, solution: Solution, references: Sequence[Reference], state: State) -> Command:
+        """U is the acceleration; its torque is worked out when somebody asks."""
+        u = solution.u
+        if not actuated(state.robot):
+            return Command(solution, references, acceleration=u)
+        return Command(solution, references, acceleration=u, torque=later(self.loads, state, u))
 
 
 def _commanded(task: Task, reference: Reference, J: FloatArray, v: FloatArray) -> FloatArray:
@@ -114,7 +134,15 @@ def _commanded(task: Task, reference: Reference, J: FloatArray, v: FloatArray) -
     return b if reference.acceleration is None else b + reference.acceleration
 
 
-def _damping(damping: Any) -> float | FloatArray:
+def spread_over(damping: float | FloatArray, nv: int) -> float | FloatArray:
+    """D, if it fits nv joints; raises ShapeError."""
+    if isinstance(damping, np.ndarray) and damping.shape != (nv,):
+        raise ShapeError(f"damping has shape {damping.shape}; expected a number or ({nv},)")
+    return damping
+
+
+def damping_of(damping: Any) -> float | FloatArray:
+    """D as a number or an array; raises ParameterError, ShapeError, NonFiniteError."""
     if np.ndim(damping) == 0:
         return checks.number("damping", damping, low=0.0)
     array = checks.vector("damping", damping)

@@ -12,6 +12,7 @@ from cartctl import checks
 from cartctl.checks import FloatArray
 from cartctl.errors import ConfigurationError, FrameNotFound, JointNotFound, ParameterError
 from cartctl.model.limits import Limits
+from cartctl.model.payload import Payload, carrying
 from cartctl.model.state import State
 from cartctl.model.visuals import Geometry
 
@@ -135,6 +136,10 @@ class Robot:
         """Whether all quaternions and (cos, sin) pairs in q have unit norm."""
         return self._plain or bool(pin.isNormalized(self.model, q, _UNIT))
 
+    def carrying(self, payload: Payload) -> Robot:
+        """The same robot with a load in its model: another Robot; raises FrameNotFound, ParameterError."""
+        return carrying(self, payload)
+
     def integrate(self, q: FloatArray, displacement: FloatArray) -> FloatArray:
         """``q (+) displacement``, (nq,); raises ShapeError, NonFiniteError."""
         return pin.integrate(self.model, _sound("q", q, self.nq), _sound("displacement", displacement, self.nv))  # type: ignore[no-any-return]
@@ -145,6 +150,8 @@ class Robot:
 
     def coordinates(self, q: FloatArray) -> FloatArray:
         """(nv,) joint coordinates of q, comparable with ``limits.position_*``; continuous joints in (-pi, pi]."""
+        if self._plain:
+            return _sound("q", q, self.nq) - self.neutral
         return pin.difference(self.model, self.neutral, _sound("q", q, self.nq))  # type: ignore[no-any-return]
 
     def configuration(self, values: Mapping[str, float], base: FloatArray | None = None) -> FloatArray:

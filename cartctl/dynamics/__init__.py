@@ -1,0 +1,1 @@
+"""The textbook terms of rigid-body dynamics, beside what Pinocchio computes."""
