@@ -159,6 +159,11 @@ class Solution:
         return Status.RECOVERING if self.recovering and outcome is not Status.FAILED else outcome
 
     @property
+    def failed(self) -> bool:
+        """Whether the solver gave up; known without grading the answer."""
+        return self._status is Status.FAILED
+
+    @property
     def outcome(self) -> Status:
         """How the problem was solved; by the residuals alone where the solver does not say."""
         if self._status is None:

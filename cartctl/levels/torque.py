@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
@@ -35,14 +35,13 @@ _MAPPED = ("inverse-inertia", "inverse-inertia-squared")  # the metrics under wh
 
 
 class Asked(NamedTuple):
-    """What tasks of m rows in all ask of a: ``J a + drift = r_ddot + 2 k (r_dot - J v) + k^2 e``; sizes: rows each."""
+    """What tasks of m rows in all ask of a: ``J a + drift = r_ddot + 2 k (r_dot - J v) + k^2 e``; sizes: rows each.
+
+    rest: drift, error, rate, acceleration, k, or k of each row, for the kernel.
+    """
 
     J: FloatArray
-    drift: FloatArray
-    error: FloatArray
-    rate: FloatArray
-    acceleration: FloatArray
-    gain: FloatArray
+    rest: tuple[Any, ...]
     sizes: tuple[int, ...]
     references: list[Reference]
 
@@ -84,11 +83,12 @@ class TorqueLevel(Level):
         self._damps = damping is not None and bool(np.any(self.damping))
         self.loads: Loads = Loads(friction, wrenches)
         self._motion = AccelerationLevel()
+        self._kernel: Any = through_inertia
 
     def check(self, solver: Solver) -> None:
         """As at the acceleration level; refuses damping with a solver that takes no reference."""
         AccelerationLevel(self.damping if self._damps and self.damping is not None else 0.0).check(solver)
-        _ = through_inertia.compiled
+        self._kernel = through_inertia.compiled
 
     def check_robot(self, robot: Robot) -> None:
         """Every coordinate needs a motor, and the inertia matrix has to be definite."""
@@ -107,16 +107,17 @@ class TorqueLevel(Level):
     ) -> tuple[Problem, list[Reference]]:
         """The problem of this instant, and the references it was made from; raises NonFiniteError, ShapeError."""
         lower, upper, outside, approach, torque = confines
-        asked = self._asked(state, tasks, times, anchors, confines)
-        h, nv, m = self.loads.effects(state), state.robot.nv, asked.J.shape[0]
+        M = state.mass_matrix  # before the Jacobians, which come along
+        J, rest, sizes, references = self._asked(state, tasks, times, anchors, confines)
+        h = self.loads.effects(state)
         low, high = (_NONE, _NONE) if lower is None or upper is None else (lower, upper)
-        rows, sides = np.empty((m + low.shape[0], nv)), np.empty((2, m + low.shape[0]))
-        given = (asked.J, asked.drift, asked.error, asked.rate, asked.acceleration, asked.gain)
-        if not _kernel()(state.mass_matrix, h, state.v, *given, low, high, rows, sides):
+        (m, nv), r = J.shape, low.shape[0]
+        rows, sides = np.empty((m + r, nv)), np.empty((2, m + r))
+        if not self._kernel(M, h, state.v, J, *rest, low, high, rows, sides):
             raise singular(state)
         equations = []
         start = 0
-        for task, size in zip(tasks, asked.sizes, strict=True):
+        for task, size in zip(tasks, sizes, strict=True):
             end = start + size
             A, b, drift = rows[start:end], sides[0, start:end], sides[1, start:end]
             if not (is_finite(b) and is_finite(drift)):
@@ -124,15 +125,15 @@ class TorqueLevel(Level):
                 require_finite(drift, f"the drift of task {task.name!r}")
             natural = task.size(state)
             if natural:
-                natural *= _stretch(asked.J[start:end], A)
+                natural *= _stretch(J[start:end], A)
             equations.append(Equation.trusted(A, b, drift, task.fit, task.weight, task.name, natural))
             start = end
-        blocks = (rows[m:], sides[0, m:], sides[1, m:]) if low.shape[0] else None
+        blocks = (rows[m:], sides[0, m:], sides[1, m:]) if r else None
         if outside is not None:
             blocks = _with_rows(state, h, blocks, outside)
         u0 = self._reference(state, secondary, h)
         least, most = (None, None) if torque is None else torque
-        return Problem.trusted(tuple(equations), metric, u0, least, most, blocks), asked.references
+        return Problem.trusted(tuple(equations), metric, u0, least, most, blocks), references
 
     def _asked(
         self,
@@ -150,12 +151,12 @@ class TorqueLevel(Level):
             drift = task.drift(state)
             rate = _NONE if reference.rate is None else reference.rate
             acceleration = _NONE if reference.acceleration is None else reference.acceleration
-            k = gain if isinstance(gain, np.ndarray) else np.array([gain])
-            return Asked(J, drift, reference.error, rate, acceleration, k, (J.shape[0],), [reference])
+            k = (0.0, gain) if isinstance(gain, np.ndarray) else (gain, _NONE)
+            return Asked(J, (drift, reference.error, rate, acceleration, *k), (J.shape[0],), [reference])
         confines = Confines(confines.lower, confines.upper, None, confines.approach)
         problem, references = self._motion.problem(state, tasks, times, anchors, Secondary(), None, confines)
         J, b, drift = (np.concatenate([getattr(e, name) for e in problem.equations]) for name in ("A", "b", "drift"))
-        return Asked(J, drift, b, _NONE, b, np.zeros(1), problem.sizes, references)
+        return Asked(J, (drift, b, _NONE, b, 0.0, _NONE), problem.sizes, references)
 
     def _reference(self, state: State, secondary: Secondary, h: FloatArray) -> FloatArray | None:
         """``h - D v`` and the objective's direction, or both through M; None for the classical form."""
@@ -189,10 +190,6 @@ class TorqueLevel(Level):
     def command(self, solution: Solution, references: Sequence[Reference], state: State) -> Command:
         """U is the torque."""
         return Command(solution, references, torque=solution.u)
-
-
-def _kernel() -> Callable[..., bool]:
-    return through_inertia.compiled
 
 
 def _stretch(J: FloatArray, A: FloatArray) -> float:

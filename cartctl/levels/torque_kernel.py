@@ -51,7 +51,7 @@ def solve(L: FloatArray, rows: FloatArray, i: int, first: int) -> None:
 
 
 @kernel(
-    "bool(matrix, vector, vector, matrix, vector, vector, vector, vector, vector, vector, vector, out_matrix, "
+    "bool(matrix, vector, vector, matrix, vector, vector, vector, vector, float, vector, vector, vector, out_matrix, "
     "out_matrix)",
     fast=True,
 )
@@ -64,7 +64,8 @@ def through_inertia(
     error: FloatArray,
     rate: FloatArray,
     acceleration: FloatArray,
-    gain: FloatArray,
+    gain: float,
+    gains: FloatArray,
     lower: FloatArray,
     upper: FloatArray,
     rows: FloatArray,
@@ -73,7 +74,8 @@ def through_inertia(
     """Fill rows (m + r, n) with ``J M^-1`` and, where there are bounds (r = n, else 0), ``M^-1``; sides (2, m + r).
 
     sides: of a task's row ``b = r_ddot + 2 k (r_dot - J v) + k^2 e`` and its drift, of a bound's row its two ends.
-    rate, acceleration: (m,), or empty for zero. Whether M is definite.
+    rate, acceleration: (m,), or empty for zero. gains: k of each row, or empty where it is ``gain``. Whether M is
+    definite.
     """
     m, n = J.shape
     L = np.empty((n, n))
@@ -88,7 +90,7 @@ def through_inertia(
         known = 0.0
         for j in range(n):
             known += rows[i, j] * h[j]
-        k = gain[i] if gain.shape[0] > 1 else gain[0]
+        k = gains[i] if gains.shape[0] else gain
         asked = rate[i] if rate.shape[0] else 0.0
         b = k * (2.0 * (asked - speed) + k * error[i])
         sides[0, i] = b + acceleration[i] if acceleration.shape[0] else b

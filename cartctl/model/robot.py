@@ -62,6 +62,7 @@ class Robot:
             self.continuous[joint.idx_v] = joint.nq == 2 and joint.nv == 1
         self._plain = all(j.nq == j.nv for j in self._joints.values())
         self.neutral = _read_only(pin.neutral(model))
+        self.has_plain_coordinates = self._plain and not self.neutral.any()  # q itself is comparable with the limits
         self.limits = Limits.of_model(model, self.dof_names, acceleration or {}, jerk or {})
         self.home = _read_only(self._home(home or {}))
         self.tool = self._tool(tool)
@@ -150,8 +151,6 @@ class Robot:
 
     def coordinates(self, q: FloatArray) -> FloatArray:
         """(nv,) joint coordinates of q, comparable with ``limits.position_*``; continuous joints in (-pi, pi]."""
-        if self._plain:
-            return _sound("q", q, self.nq) - self.neutral
         return pin.difference(self.model, self.neutral, _sound("q", q, self.nq))  # type: ignore[no-any-return]
 
     def configuration(self, values: Mapping[str, float], base: FloatArray | None = None) -> FloatArray:

@@ -16,6 +16,9 @@ _WORLD_ALIGNED = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
 _joint_jacobians = pin.computeJointJacobians
 _frame_jacobian = pin.getFrameJacobian
 _place_frame = pin.updateFramePlacement
+_mass_matrix = pin.crba
+_WORLD = pin.Convention.WORLD
+_nonlinear_effects = pin.nonLinearEffects
 
 
 class State:
@@ -116,10 +119,11 @@ class State:
         """``M(q)``, (nv, nv), symmetric."""
         M = self._cache.get("M")
         if M is None:
-            M = pin.crba(self._model, self._data, self.q)  # a copy of its own, both triangles filled
+            M = _mass_matrix(self._model, self._data, self.q, _WORLD)  # a copy of its own, both triangles filled
             M = M.reshape(-1, 1) if M.ndim < 2 else M  # with one joint, Pinocchio hands out a vector
             M.flags.writeable = False
             self._cache["M"] = M
+            self._kinematics = True  # placements and joint Jacobians come along
         return M
 
     @property
@@ -127,7 +131,7 @@ class State:
         """``h(q, v)``, (nv,): Coriolis, centrifugal and gravity torques, N m."""
         h = self._cache.get("h")
         if h is None:
-            h = pin.nonLinearEffects(self._model, self._data, self.q, self.v)  # a copy of its own
+            h = _nonlinear_effects(self._model, self._data, self.q, self.v)  # a copy of its own
             h.flags.writeable = False
             self._cache["h"] = h
         return h

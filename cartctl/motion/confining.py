@@ -63,6 +63,7 @@ class Confining:
         self.yields = level.limits_are_rows or self._torque is not None
         self.recovering = False
         self._now = UNCONFINED
+        self._coordinates = _itself if robot.has_plain_coordinates else robot.coordinates
 
     def reset(self) -> None:
         """Forget the previous step."""
@@ -77,7 +78,7 @@ class Confining:
             self.recovering = False
             box = None
         else:
-            lower, upper, self.recovering = self._bounds(self._robot.coordinates(state.q), state.v)
+            lower, upper, self.recovering = self._bounds(self._coordinates(state.q), state.v)
             box = Box(lower, upper)
         rows = None
         if self._constraints:
@@ -110,10 +111,18 @@ class Confining:
         u = self._level.stopping(state, self._dt)
         if not self.yields:
             return u
-        T, t, _, _ = self._level.motion(state)
-        braking = Equation(T, T @ u, fit="least_squares", name="stop")  # in terms of accelerations, not of torques
+        T = self._level.motion(state).T  # nearest in terms of accelerations, not of torques
+        braking = Equation(T, T @ u, fit="least_squares", name="stop")
         nearest = Problem((braking,), problem.lower, problem.upper, problem.constraints)
-        return solve(nearest, "hqp").u
+        for solver in ("hqp", "qp"):
+            stopped = solve(nearest, solver)
+            if not stopped.failed:
+                break
+        return stopped.u
+
+
+def _itself(q: FloatArray) -> FloatArray:
+    return q
 
 
 def _warn_of_rows(solver: Solver, level: Level) -> None:

@@ -176,9 +176,13 @@ class Controller:
                 solution = self.solver.solve(problem)
                 if missed(solution):
                     solution = Solution(problem, best, self.solver.name, status=Status.INFEASIBLE)
-        if _skipped(solution):
-            again = towards_rest(problem, np.isnan(solution.scales), self._confining.stopping(problem, state))
+        if _skipped(solution) or (self._confining.yields and solution.failed):
+            stopping = self._confining.stopping(problem, state)
+            again = towards_rest(problem, ~(solution.scales == 1.0), stopping)
             solution = self.solver.solve(again, solution)
+            if self._confining.yields and (_skipped(solution) or solution.failed):
+                skipped = np.full(len(again.equations), np.nan)  # what is left is to brake, within all bounds
+                solution = Solution(again, stopping, self.solver.name, status=Status.SKIPPED, scales=skipped)
         solution.recovering, solution.yielded = self._confining.recovering, yielded
         return solution
 
