@@ -29,7 +29,7 @@ from cartctl.solvers import solve
 
 ORDER = ("constraints", "acceleration", "velocity", "position")  # torque never
 MISSED = 1e-9  # of a row, relative to its entries: what counts as missed
-_ROOM = 1e-7  # relative: widened bounds leave this much, so that round-off cannot close them
+_ROOM = 1e-8  # relative: widened bounds leave this much, so that round-off cannot close them
 
 
 class Layer(NamedTuple):
