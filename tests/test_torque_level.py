@@ -213,7 +213,9 @@ def test_the_reference_is_by_metric(metric, damping, objective):
     )
     u0 = controller.step(state.q, state.v).solution.problem.reference
     mapped = metric.startswith("inverse")
-    D = (10.0 if mapped else 2.0) if damping is None else damping
+    inertia = state.mass_matrix.diagonal()
+    by_default = 20.0 if mapped else np.minimum(3.0 + 10.0 * inertia, 300.0 * inertia)
+    D = by_default if damping is None else damping
     push = -D * state.v + (0.0 if objective is None else -4.0 * np.cos(state.q))
     if objective is None and damping is not None and not np.any(damping):
         assert u0 is None

@@ -28,8 +28,7 @@ from cartctl.model.wrench import Wrench
 from cartctl.solvers import Solver
 from cartctl.tasks.base import Reference, Task
 
-DAMPING = 10.0  # 1/s
-TORQUE_DAMPING = 2.0  # N m s/rad
+DAMPING = 20.0  # 1/s
 _NONE = np.zeros(0)
 _MAPPED = ("inverse-inertia", "inverse-inertia-squared")  # the metrics under which damping goes through M
 
@@ -56,9 +55,10 @@ class TorqueLevel(Level):
 
     damping: D >= 0, a number or (nv,), of motion in the null space. With the two metrics of inertia
     ``u0 = h - M D v`` (+ ``k M grad H``), D in 1/s; with any other ``u0 = h - D v`` (+ ``k grad H``), D in N m s/rad.
-    0 is the classical form, ``u0 = 0`` (+ the objective's term): its null space falls under gravity, and with least
-    torques it is known to gain speed without bound (Hollerbach & Suh 1987). Damping needs a solver that honours a
-    reference; None means 0 where the solver takes none, else 10 1/s or 2 N m s/rad.
+    0 without an objective is the classical form, ``u0 = 0``: its null space falls under gravity, and with least torques
+    it is known to gain speed without bound (Hollerbach & Suh 1987); these favour light joints, a wrist may spin even
+    damped. Damping needs a solver that honours a reference. None means 0 where the solver takes none, else 20 1/s, or
+    ``D_i = min(3 N m s/rad + 10 M_ii /s, 300 M_ii /s)``, which a step of some ms can follow at light joints, too.
 
     Torque bounds are a box; position, velocity and acceleration limits rows ``C = M^-1``; they yield in the order of
     :mod:`cartctl.levels.yielding`.
@@ -165,7 +165,7 @@ class TorqueLevel(Level):
         mapped, objective = secondary.weighing in _MAPPED, secondary.objective
         D = self.damping
         if D is None:
-            D = DAMPING if mapped else TORQUE_DAMPING
+            D = DAMPING if mapped else _default(state.mass_matrix.diagonal())
         elif not self._damps and objective is None:
             return None
         u0 = spread_over(D, state.robot.nv) * -state.v
@@ -190,6 +190,11 @@ class TorqueLevel(Level):
     def command(self, solution: Solution, references: Sequence[Reference], state: State) -> Command:
         """U is the torque."""
         return Command(solution, references, torque=solution.u)
+
+
+def _default(inertia: FloatArray) -> FloatArray:
+    """D in N m s/rad for joints of these inertias: enough for the heavy ones, not too stiff for the light ones."""
+    return np.minimum(3.0 + 10.0 * inertia, 300.0 * inertia)
 
 
 def _stretch(J: FloatArray, A: FloatArray) -> float:
