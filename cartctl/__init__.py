@@ -64,7 +64,13 @@ _HOMES = {
     ),
     "cartctl.constraints": ("Constraint", "FrameBox", "FrameSpeed", "HalfSpace"),
     "cartctl.objectives": ("JointRange", "Objective"),
-    "cartctl.levels": ("AccelerationLevel", "Command"),
+    "cartctl.levels": ("AccelerationLevel", "Command", "TorqueLevel"),
+    "cartctl.dynamics.friction": ("Friction",),
+    "cartctl.model.payload": ("Payload",),
+    "cartctl.model.wrench": ("Wrench",),
+    "cartctl.motion.energy": ("EnergyBooks",),
+    "cartctl.motion.free": ("FreeMotion", "free_motion"),
+    "cartctl.motion.plant": ("Plant",),
     "cartctl.motion.controller": ("Controller",),
     "cartctl.motion.simulate": ("simulate",),
     "cartctl.motion.run": ("Run", "TaskRecord"),
@@ -107,22 +113,30 @@ if TYPE_CHECKING:  # editors and mypy see what __getattr__ finds
     from cartctl.constraints import FrameBox as FrameBox
     from cartctl.constraints import FrameSpeed as FrameSpeed
     from cartctl.constraints import HalfSpace as HalfSpace
+    from cartctl.dynamics.friction import Friction as Friction
     from cartctl.errors import CartctlError as CartctlError
     from cartctl.errors import CartctlWarning as CartctlWarning
     from cartctl.errors import RunInterrupted as RunInterrupted
     from cartctl.levels import AccelerationLevel as AccelerationLevel
     from cartctl.levels import Command as Command
+    from cartctl.levels import TorqueLevel as TorqueLevel
     from cartctl.levels.metrics import JointLimitMetric as JointLimitMetric
     from cartctl.model.library import robots as robots
     from cartctl.model.limits import Limits as Limits
     from cartctl.model.loading import load as load
     from cartctl.model.loading import planar as planar
+    from cartctl.model.payload import Payload as Payload
     from cartctl.model.robot import Robot as Robot
     from cartctl.model.state import State as State
+    from cartctl.model.wrench import Wrench as Wrench
     from cartctl.motion.controller import Controller as Controller
+    from cartctl.motion.energy import EnergyBooks as EnergyBooks
+    from cartctl.motion.free import FreeMotion as FreeMotion
+    from cartctl.motion.free import free_motion as free_motion
     from cartctl.motion.metrics import JointMetrics as JointMetrics
     from cartctl.motion.metrics import Metrics as Metrics
     from cartctl.motion.metrics import TaskMetrics as TaskMetrics
+    from cartctl.motion.plant import Plant as Plant
     from cartctl.motion.run import Run as Run
     from cartctl.motion.run import TaskRecord as TaskRecord
     from cartctl.motion.simulate import simulate as simulate

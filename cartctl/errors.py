@@ -46,6 +46,10 @@ class UnsupportedJoint(CartctlError, ValueError):  # noqa: N818 - like its sibli
     """A formula does not hold for a kind of joint the robot has."""
 
 
+class UnderactuatedRobot(CartctlError, ValueError):  # noqa: N818 - names what the robot is
+    """Torques are asked of a robot that moves in ways no motor drives, or whose inertia matrix is singular."""
+
+
 class SolverOutputError(CartctlError, ValueError):
     """A solver of the user's returned something else than (n,) finite numbers."""
 

@@ -116,8 +116,9 @@ def test_what_it_cannot_do_is_refused_in_words() -> None:
 def test_the_level_is_known_by_name_and_commands_accelerations() -> None:
     assert levels()[:2] == ["velocity", "acceleration"]
     assert isinstance(get_level("acceleration"), cc.AccelerationLevel)
-    command = cc.Controller(planar(), cc.FrameTask("tool", "xy"), level="acceleration", limits=None).step(np.ones(3))
-    assert command.velocity is None and command.torque is None
+    robot = planar()
+    command = cc.Controller(robot, cc.FrameTask("tool", "xy"), level="acceleration", limits=None).step(np.ones(3))
+    assert command.velocity is None and command.told is command.acceleration
     np.testing.assert_array_equal(command.acceleration, command.solution.u)
 
 

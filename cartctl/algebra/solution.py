@@ -36,6 +36,10 @@ class Status(Enum):
         "The bounds, constraint rows and commands contradict each other even at rest; u keeps the box, and "
         "bound_violation() says by how much constraint rows are missed."
     )
+    YIELDED = (
+        "Limits exclude each other here; constraints gave way first, then acceleration, velocity, position limits, "
+        "torque bounds never: solution.yielded says which."
+    )
     RECOVERING = (
         "A joint is outside a limit, or too fast to stop in time, and is being brought back at a bounded rate; "
         "the tasks get what is left."
@@ -88,6 +92,7 @@ class Solution:
         "solver",
         "u",
         "warm",
+        "yielded",
     )
 
     def __init__(
@@ -105,6 +110,7 @@ class Solution:
         self.solver = solver
         self.lost_rank = lost_rank
         self.recovering = False  # set by a controller whose limits had to bring a joint back
+        self.yielded: tuple[str, ...] = ()  # set by a controller: the classes of limits that gave way, the first first
         self.warm: Any = None  # what the same solver may start from next time
         self._method = method
         self._status = status
@@ -146,9 +152,16 @@ class Solution:
 
     @property
     def status(self) -> Status:
-        """How it went: RECOVERING where joints are being brought back, else the outcome."""
+        """How it went: YIELDED where limits gave way, RECOVERING where joints come back, or the outcome."""
         outcome = self.outcome
+        if self.yielded and outcome not in (Status.FAILED, Status.INFEASIBLE):
+            return Status.YIELDED
         return Status.RECOVERING if self.recovering and outcome is not Status.FAILED else outcome
+
+    @property
+    def failed(self) -> bool:
+        """Whether the solver gave up; known without grading the answer."""
+        return self._status is Status.FAILED
 
     @property
     def outcome(self) -> Status:

@@ -5,11 +5,16 @@ from __future__ import annotations
 from cartctl.errors import LevelNotFound, ParameterError
 from cartctl.levels.acceleration import AccelerationLevel
 from cartctl.levels.base import Command, Level, Secondary
+from cartctl.levels.torque import TorqueLevel
 from cartctl.levels.velocity import VelocityLevel
 
-_REGISTRY: dict[str, type[Level]] = {"velocity": VelocityLevel, "acceleration": AccelerationLevel}
+_REGISTRY: dict[str, type[Level]] = {
+    "velocity": VelocityLevel,
+    "acceleration": AccelerationLevel,
+    "torque": TorqueLevel,
+}
 
-__all__ = ["AccelerationLevel", "Command", "Level", "Secondary", "VelocityLevel", "get_level", "levels"]
+__all__ = ["AccelerationLevel", "Command", "Level", "Secondary", "TorqueLevel", "VelocityLevel", "get_level", "levels"]
 
 
 def levels() -> list[str]:

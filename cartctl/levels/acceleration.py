@@ -12,13 +12,17 @@ from cartctl.algebra.problem import Equation, Problem
 from cartctl.algebra.solution import Solution
 from cartctl.checks import FloatArray
 from cartctl.constraints import Box, Constraint, Rows
+from cartctl.dynamics.friction import Friction
 from cartctl.errors import ParameterError, ShapeError, UnsupportedProblem
 from cartctl.levels.acceleration_bounds import AccelerationBounds
 from cartctl.levels.approach import Approach
-from cartctl.levels.base import UNCONFINED, Command, Confines, Level, Secondary, direction, require_finite
+from cartctl.levels.base import UNCONFINED, Command, Confines, Level, Motion, Secondary, direction, require_finite
 from cartctl.levels.bounds import JointBounds
+from cartctl.levels.loads import Loads, actuated, later
 from cartctl.levels.steering import Steered, Steering
+from cartctl.levels.torque_bounds import torque_rows
 from cartctl.model.state import State
+from cartctl.model.wrench import Wrench
 from cartctl.solvers import Solver
 from cartctl.tasks.base import Reference, Task
 
@@ -35,7 +39,11 @@ class AccelerationLevel(Level):
     honours a reference. None: under limits twice the largest gain (see :mod:`cartctl.levels.steering`), else 0. The
     robot has to move by ``q (+) (v dt + a dt^2/2), v + a dt``.
 
-    Raises ParameterError, NonFiniteError.
+    Bounds on torques are rows ``lower - h <= M a <= upper - h``, where limits are in force, hold any, and every
+    coordinate has a motor. friction, wrenches: what h knows of beside the robot's own (:mod:`cartctl.levels.loads`).
+    Limits that contradict each other yield in the order of :mod:`cartctl.levels.yielding`.
+
+    Raises ParameterError, NonFiniteError; ShapeError, FrameNotFound when a controller is made.
     """
 
     name: ClassVar[str] = "acceleration"
@@ -43,9 +51,16 @@ class AccelerationLevel(Level):
     approaching: ClassVar[type[Approach] | None] = Steering
     stable_below: ClassVar[float] = 1.0
 
-    def __init__(self, damping: float | FloatArray | None = None) -> None:
-        self.damping = None if damping is None else _damping(damping)
+    def __init__(
+        self,
+        damping: float | FloatArray | None = None,
+        *,
+        friction: Friction | None = None,
+        wrenches: Wrench | Sequence[Wrench] = (),
+    ) -> None:
+        self.damping = None if damping is None else damping_of(damping)
         self._damps = self.damping is not None and bool(np.any(self.damping))
+        self.loads: Loads = Loads(friction, wrenches)
 
     def check(self, solver: Solver) -> None:
         """Refuse a method that keeps an objective extremal, and damping with one that takes no reference."""
@@ -73,7 +88,7 @@ class AccelerationLevel(Level):
         """The problem of this instant, and the references it was made from; raises NonFiniteError, ShapeError."""
         equations: list[Equation] = []
         references: list[Reference] = []
-        lower, upper, rows, approach = confines
+        lower, upper, rows, approach, torque = confines
         steering = approach if isinstance(approach, Steering) else None
         if steering is not None:
             steering.begin(state, lower, upper, rows)
@@ -89,34 +104,38 @@ class AccelerationLevel(Level):
         u0 = self._reference(state, secondary, 0.0 if steering is None else steering.damping(tasks))
         if steering is not None and u0 is not None:
             u0 = steering.calm_reference(u0, state.v)
+        if torque is not None:
+            rows = torque_rows(self.loads, state, rows, torque)
         return Problem.trusted(tuple(equations), metric, u0, lower, upper, rows), references
 
     def _reference(self, state: State, secondary: Secondary, otherwise: float) -> FloatArray | None:
         """``u0 = -k grad H - D v`` (nv,), None where there is neither; otherwise: D where none was chosen."""
-        D = otherwise if self.damping is None else self._spread(state.robot.nv)
+        D = otherwise if self.damping is None else spread_over(self.damping, state.robot.nv)
         braking = -D * state.v if np.any(D) else None
         if secondary.objective is None:
             return braking
         u0 = secondary.share * direction(secondary.objective, state)
         return u0 if braking is None else u0 + braking
 
-    def _spread(self, nv: int) -> float | FloatArray:
-        assert self.damping is not None
-        if isinstance(self.damping, np.ndarray) and self.damping.shape != (nv,):
-            raise ShapeError(f"damping has shape {self.damping.shape}; expected a number or ({nv},)")
-        return self.damping
-
     def rows(self, constraint: Constraint, state: State, dt: float, box: Box | None) -> Rows:
         """The rows of a constraint on a."""
         return constraint.acceleration_rows(state, dt, box)
+
+    def motion(self, state: State) -> Motion:
+        """U is the acceleration; torques are ``M a + h``."""
+        n = state.robot.nv
+        return Motion(np.eye(n), np.zeros(n), state.mass_matrix, self.loads.effects(state))
 
     def stopping(self, state: State, dt: float) -> FloatArray:
         """``-v/dt``."""
         return -state.v / dt
 
-    def command(self, solution: Solution, references: Sequence[Reference]) -> Command:
-        """U is the acceleration."""
-        return Command(solution, references, acceleration=solution.u)
+    def command(self, solution: Solution, references: Sequence[Reference], state: State) -> Command:
+        """U is the acceleration; its torque is worked out when somebody asks."""
+        u = solution.u
+        if not actuated(state.robot):
+            return Command(solution, references, acceleration=u)
+        return Command(solution, references, acceleration=u, torque=later(self.loads, state, u))
 
 
 def _commanded(task: Task, reference: Reference, J: FloatArray, v: FloatArray) -> FloatArray:
@@ -127,7 +146,15 @@ def _commanded(task: Task, reference: Reference, J: FloatArray, v: FloatArray) -
     return b if reference.acceleration is None else b + reference.acceleration
 
 
-def _damping(damping: Any) -> float | FloatArray:
+def spread_over(damping: float | FloatArray, nv: int) -> float | FloatArray:
+    """D, if it fits nv joints; raises ShapeError."""
+    if isinstance(damping, np.ndarray) and damping.shape != (nv,):
+        raise ShapeError(f"damping has shape {damping.shape}; expected a number or ({nv},)")
+    return damping
+
+
+def damping_of(damping: Any) -> float | FloatArray:
+    """D as a number or an array; raises ParameterError, ShapeError, NonFiniteError."""
     if np.ndim(damping) == 0:
         return checks.number("damping", damping, low=0.0)
     array = checks.vector("damping", damping)

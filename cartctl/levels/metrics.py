@@ -1,8 +1,11 @@
-"""Metrics W by name, as an array, or as a function of the state."""
+"""Metrics W by name, as an array, or as a function of the state.
+
+On velocities and accelerations, W = M is the metric of kinetic energy; on torques, M^-1 is, and the names differ.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,6 +15,7 @@ from cartctl import checks
 from cartctl.algebra.metric import as_metric
 from cartctl.checks import FloatArray
 from cartctl.errors import ParameterError
+from cartctl.levels.inertia import inverse_inertia, inverse_inertia_squared
 from cartctl.model.limits import Limits
 from cartctl.model.state import State
 
@@ -66,24 +70,38 @@ def _inertia(state: State) -> FloatArray:
     return state.mass_matrix
 
 
-NAMED: dict[str, Callable[[State], FloatArray] | None] = {
+Named = Mapping[str, Callable[[State], FloatArray] | None]
+
+KINEMATIC: Named = {"identity": None, "inertia": _inertia, "joint-limits": JointLimitMetric()}
+DYNAMIC: Named = {
     "identity": None,
-    "inertia": _inertia,
-    "joint-limits": JointLimitMetric(),
+    "inverse-inertia": inverse_inertia,
+    "inverse-inertia-squared": inverse_inertia_squared,
 }
 
 
-def as_state_metric(metric: Any, nv: int) -> Metric:
+def as_state_metric(metric: Any, nv: int, named: Named = KINEMATIC) -> Metric:
     """``metric`` as None (identity), a checked array, or a function of the state whose answers are checked.
 
-    Raises ParameterError, MetricError, ShapeError, NonFiniteError.
+    named: the names that mean something at the level. Raises ParameterError, MetricError, ShapeError, NonFiniteError.
     """
     if metric is None:
         return None
     if isinstance(metric, str):
-        return NAMED[checks.choice("metric", metric, tuple(NAMED))]
+        return named[_known(metric, named)]
     if isinstance(metric, JointLimitMetric):
         return metric
     if callable(metric):
         return lambda state: as_metric(metric(state), nv)
     return as_metric(metric, nv)
+
+
+def _known(name: str, named: Named) -> str:
+    """``name`` if it is one of these; one that belongs to another level is refused in its own words."""
+    if name not in named and (name in KINEMATIC or name in DYNAMIC):
+        here, other = ("torques", "velocities and accelerations") if named is DYNAMIC else ("motion", "torques")
+        raise ParameterError(
+            f"metric {name!r} is one of {other}; expected one of {', '.join(map(repr, named))} at a level that "
+            f"commands {here}"
+        )
+    return checks.choice("metric", name, tuple(named))

@@ -43,7 +43,7 @@ class VelocityLevel(Level):
         """The problem of this instant, and the references it was made from; raises NonFiniteError."""
         equations: list[Equation] = []
         references: list[Reference] = []
-        lower, upper, rows, approach = confines
+        lower, upper, rows, approach, _ = confines
         if approach is not None:
             approach.begin(state, lower, upper, rows)
         for task, t, anchor in zip(tasks, times, anchors):  # noqa: B905 - equally long by construction, in a hot loop
@@ -81,6 +81,6 @@ class VelocityLevel(Level):
         """The rows of a constraint on v."""
         return constraint.velocity_rows(state, dt, box)
 
-    def command(self, solution: Solution, references: Sequence[Reference]) -> Command:
+    def command(self, solution: Solution, references: Sequence[Reference], state: State) -> Command:
         """U is the velocity."""
         return Command(solution, references, velocity=solution.u)

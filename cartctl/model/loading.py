@@ -7,6 +7,7 @@ import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from fnmatch import fnmatchcase
+from functools import reduce
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,7 @@ from cartctl.model import urdf as urdf_file
 from cartctl.model.console import console_of_c
 from cartctl.model.library import LibraryEntry, find, robots
 from cartctl.model.meshes import MeshFolders
+from cartctl.model.payload import Payload
 from cartctl.model.planar import PlanarLimits, planar_urdf
 from cartctl.model.robot import Robot
 from cartctl.model.urdf import Urdf
@@ -233,6 +235,9 @@ def _gravity(gravity: Sequence[float]) -> pin.Motion:
 
 def reload(spec: Mapping[str, Any]) -> Robot:
     """The robot whose ``spec`` this is."""
+    if "payloads" in spec:
+        bare = {key: value for key, value in spec.items() if key != "payloads"}
+        return reduce(Robot.carrying, (Payload(**entry) for entry in spec["payloads"]), reload(bare))
     if "lengths" not in spec:
         return load(**spec)
     limits = spec.get("limits")

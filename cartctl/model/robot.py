@@ -12,6 +12,7 @@ from cartctl import checks
 from cartctl.checks import FloatArray
 from cartctl.errors import ConfigurationError, FrameNotFound, JointNotFound, ParameterError
 from cartctl.model.limits import Limits
+from cartctl.model.payload import Payload, carrying
 from cartctl.model.state import State
 from cartctl.model.visuals import Geometry
 
@@ -61,6 +62,7 @@ class Robot:
             self.continuous[joint.idx_v] = joint.nq == 2 and joint.nv == 1
         self._plain = all(j.nq == j.nv for j in self._joints.values())
         self.neutral = _read_only(pin.neutral(model))
+        self.has_plain_coordinates = self._plain and not self.neutral.any()  # q itself is comparable with the limits
         self.limits = Limits.of_model(model, self.dof_names, acceleration or {}, jerk or {})
         self.home = _read_only(self._home(home or {}))
         self.tool = self._tool(tool)
@@ -134,6 +136,10 @@ class Robot:
     def is_on_manifold(self, q: FloatArray) -> bool:
         """Whether all quaternions and (cos, sin) pairs in q have unit norm."""
         return self._plain or bool(pin.isNormalized(self.model, q, _UNIT))
+
+    def carrying(self, payload: Payload) -> Robot:
+        """The same robot with a load in its model: another Robot; raises FrameNotFound, ParameterError."""
+        return carrying(self, payload)
 
     def integrate(self, q: FloatArray, displacement: FloatArray) -> FloatArray:
         """``q (+) displacement``, (nq,); raises ShapeError, NonFiniteError."""

@@ -16,6 +16,9 @@ _WORLD_ALIGNED = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
 _joint_jacobians = pin.computeJointJacobians
 _frame_jacobian = pin.getFrameJacobian
 _place_frame = pin.updateFramePlacement
+_mass_matrix = pin.crba
+_WORLD = pin.Convention.WORLD
+_nonlinear_effects = pin.nonLinearEffects
 
 
 class State:
@@ -33,9 +36,10 @@ class State:
         "_frames",
         "_kinematics",
         "_model",
-        "_stamp",
+        "_rest",
         "q",
         "robot",
+        "stamp",
         "v",
     )
 
@@ -44,14 +48,15 @@ class State:
         self._model = robot.model
         self._data = robot.model.createData()
         self._frames: dict[str, FrameView] = {}
-        self._stamp = 0
+        self.stamp = 0
+        self._rest = np.zeros(robot.nv)
         self.set(robot.neutral, np.zeros(robot.nv))
 
     def set(self, q: FloatArray, v: FloatArray) -> None:
         """Move to (q, v), already checked, and forget all that was computed; for loops that own their state."""
         self.q = q
         self.v = v
-        self._stamp += 1
+        self.stamp += 1
         self._kinematics = False
         self._accelerated = False
         self._cache: dict[str, FloatArray] = {}
@@ -61,12 +66,12 @@ class State:
         view = self._frames.get(frame)
         if view is None:
             view = self._frames[frame] = FrameView(self._data, self.robot.frame_id(frame))
-        if view.placed != self._stamp:
+        if view.placed != self.stamp:
             if not self._kinematics:
                 _joint_jacobians(self._model, self._data, self.q)
                 self._kinematics = True
             _place_frame(self._model, self._data, view.fid)
-            view.placed = self._stamp
+            view.placed = self.stamp
         return view
 
     def placement(self, frame: str) -> pin.SE3:
@@ -84,13 +89,13 @@ class State:
     def jacobian(self, frame: str) -> FloatArray:
         """``J`` (6, nv): twist of ``frame`` = J v."""
         view = self.place(frame)
-        if view.differentiated != self._stamp:
+        if view.differentiated != self.stamp:
             J = _frame_jacobian(self._model, self._data, view.fid, _WORLD_ALIGNED)
             if J.ndim == 1:  # with one joint, Pinocchio hands out a vector
                 J = J.reshape(6, 1)
             J.flags.writeable = False
             view.jacobian = J
-            view.differentiated = self._stamp
+            view.differentiated = self.stamp
         return view.jacobian
 
     def twist(self, frame: str) -> FloatArray:
@@ -103,7 +108,7 @@ class State:
         if key not in self._cache:
             fid = self.robot.frame_id(frame)
             if not self._accelerated:
-                pin.forwardKinematics(self._model, self._data, self.q, self.v, np.zeros(self._model.nv))
+                pin.forwardKinematics(self._model, self._data, self.q, self.v, self._rest)
                 self._accelerated = True
             motion = pin.getFrameClassicalAcceleration(self._model, self._data, fid, _WORLD_ALIGNED)
             self._cache[key] = _frozen(motion.vector)
@@ -112,12 +117,24 @@ class State:
     @property
     def mass_matrix(self) -> FloatArray:
         """``M(q)``, (nv, nv), symmetric."""
-        return self._once("M", lambda: _symmetric(pin.crba(self._model, self._data, self.q)))
+        M = self._cache.get("M")
+        if M is None:
+            M = _mass_matrix(self._model, self._data, self.q, _WORLD)  # a copy of its own, both triangles filled
+            M = M.reshape(-1, 1) if M.ndim < 2 else M  # with one joint, Pinocchio hands out a vector
+            M.flags.writeable = False
+            self._cache["M"] = M
+            self._kinematics = True  # placements and joint Jacobians come along
+        return M
 
     @property
     def nonlinear_effects(self) -> FloatArray:
         """``h(q, v)``, (nv,): Coriolis, centrifugal and gravity torques, N m."""
-        return self._once("h", lambda: pin.nonLinearEffects(self._model, self._data, self.q, self.v))
+        h = self._cache.get("h")
+        if h is None:
+            h = _nonlinear_effects(self._model, self._data, self.q, self.v)  # a copy of its own
+            h.flags.writeable = False
+            self._cache["h"] = h
+        return h
 
     @property
     def gravity(self) -> FloatArray:
@@ -168,9 +185,3 @@ def _frozen(array: Any) -> FloatArray:
     copy = np.array(array, dtype=np.float64)
     copy.flags.writeable = False
     return copy
-
-
-def _symmetric(M: FloatArray) -> FloatArray:
-    """M with the lower triangle that crba leaves open; with one joint, Pinocchio hands out a vector."""
-    M = M.reshape(-1, 1) if M.ndim < 2 else M
-    return np.triu(M) + np.triu(M, 1).T  # type: ignore[no-any-return]

@@ -2,17 +2,24 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 
+from cartctl.algebra.problem import Equation, Problem
+from cartctl.checks import FloatArray
 from cartctl.constraints import Box, Constraint, stacked
-from cartctl.errors import ParameterError, UnsupportedProblem
+from cartctl.errors import CartctlWarning, ParameterError, UnsupportedProblem
 from cartctl.levels import Level
 from cartctl.levels.approach import Approach
 from cartctl.levels.base import UNCONFINED, Confines
+from cartctl.levels.bounds import JointBounds
+from cartctl.levels.loads import actuated
+from cartctl.levels.torque_bounds import torque_box
+from cartctl.levels.yielding import Layer, Widened, intervals, widened
 from cartctl.model.limits import Limits
 from cartctl.model.robot import Robot
 from cartctl.model.state import State
-from cartctl.solvers import Solver, solvers_that_honour
+from cartctl.solvers import Solver, solve, solvers_that_honour
 from cartctl.tasks.base import Task
 
 
@@ -35,17 +42,27 @@ class Confining:
         self._robot, self._level, self._dt = robot, level, dt
         self._constraints = _checked(constraints, robot, solver)
         joints = _joints(disabled, robot)
-        self._bounds = None
+        self._bounds: JointBounds | None = None
         self._approach: Approach | None = None
+        self._torque: Box | None = None
         if limits is not None:
             assert level.bounds is not None
-            self._bounds = level.bounds(limits, dt, joints, jerk, robot.dof_names)
+            takes_rows = "constraints" in solver.honours
+            if level.loads is not None and actuated(robot) and (takes_rows or level.limits_are_rows):
+                self._torque = torque_box(limits)
+            if takes_rows or not level.limits_are_rows:
+                self._bounds = level.bounds(limits, dt, joints, jerk, robot.dof_names)
+            else:
+                _warn_of_rows(solver, level)
             if approach and level.approaching is not None:
                 self._approach = level.approaching(limits, dt, State(robot), solver, waiting)
         elif joints or jerk:
             what = "disabled" if joints else "jerk"
             raise ParameterError(f"{what} is given without limits; expected limits= for it to be a part of")
+        self.yields = level.limits_are_rows or self._torque is not None
         self.recovering = False
+        self._now = UNCONFINED
+        self._coordinates = _itself if robot.has_plain_coordinates else robot.coordinates
 
     def reset(self) -> None:
         """Forget the previous step."""
@@ -60,15 +77,60 @@ class Confining:
             self.recovering = False
             box = None
         else:
-            lower, upper, self.recovering = self._bounds(self._robot.coordinates(state.q), state.v)
+            lower, upper, self.recovering = self._bounds(self._coordinates(state.q), state.v)
             box = Box(lower, upper)
-        if not self._constraints:
-            return UNCONFINED if box is None else Confines(box.lower, box.upper, None, self._approach)
-        blocks = stacked([self._level.rows(c, state, self._dt, box) for c in self._constraints])
-        rows = None if blocks is None else (blocks.C, blocks.lower, blocks.upper)
+        rows = None
+        if self._constraints:
+            blocks = stacked([self._level.rows(c, state, self._dt, box) for c in self._constraints])
+            rows = None if blocks is None else (blocks.C, blocks.lower, blocks.upper)
         if box is None:
-            return Confines(None, None, rows, None)
-        return Confines(box.lower, box.upper, rows, self._approach)
+            self._now = Confines(None, None, rows, None, self._torque)
+        else:
+            self._now = Confines(box.lower, box.upper, rows, self._approach, self._torque)
+        return self._now
+
+    def widened(self, problem: Problem, state: State) -> Widened:
+        """The problem of the state :meth:`at` was last asked about, with limits that exclude each other widened."""
+        lower, upper, rows, _, torque = self._now
+        T, t, S, s = self._level.motion(state)
+        layers = []
+        if self._bounds is not None and lower is not None and upper is not None:
+            q = self._robot.coordinates(state.q)
+            for name, box in intervals(self._bounds, q, state.v, Box(lower, upper)).items():
+                layers.append(Layer(name, T, box.lower - t, box.upper - t))
+        if rows is not None:
+            shift = rows[0] @ t
+            layers.append(Layer("constraints", rows[0] @ T, rows[1] - shift, rows[2] - shift))
+        if torque is None or self._level.limits_are_rows:
+            return widened(problem, layers, torque)
+        return widened(problem, layers, Layer("torque", S, torque.lower - s, torque.upper - s))
+
+    def stopping(self, problem: Problem, state: State) -> FloatArray:
+        """The u that comes nearest to stopping within the step, inside all bounds of the problem, (n,)."""
+        u = self._level.stopping(state, self._dt)
+        if not self.yields:
+            return u
+        T = self._level.motion(state).T  # nearest in terms of accelerations, not of torques
+        braking = Equation(T, T @ u, fit="least_squares", name="stop")
+        nearest = Problem((braking,), problem.lower, problem.upper, problem.constraints)
+        for solver in ("hqp", "qp"):
+            stopped = solve(nearest, solver)
+            if not stopped.failed:
+                break
+        return stopped.u
+
+
+def _itself(q: FloatArray) -> FloatArray:
+    return q
+
+
+def _warn_of_rows(solver: Solver, level: Level) -> None:
+    warnings.warn(
+        f"solver {solver.name!r} honours no rows: at level {level.name!r} it keeps torque bounds, not those on "
+        "position, velocity and acceleration (run.metrics() counts violations)",
+        CartctlWarning,
+        stacklevel=5,
+    )
 
 
 def _checked(constraints: Sequence[Constraint], robot: Robot, solver: Solver) -> tuple[Constraint, ...]:

@@ -11,12 +11,13 @@ import numpy as np
 
 from cartctl import checks
 from cartctl.algebra.problem import Problem
-from cartctl.algebra.solution import Solution
+from cartctl.algebra.solution import Solution, Status
 from cartctl.checks import LARGEST, FloatArray, is_moderate
 from cartctl.constraints import Constraint
 from cartctl.errors import CartctlWarning, NoTasksError, ParameterError, ProblemError, UnsupportedProblem
 from cartctl.levels import Command, Level, Secondary, get_level
 from cartctl.levels.metrics import as_state_metric
+from cartctl.levels.yielding import missed
 from cartctl.model.limits import Limits
 from cartctl.model.robot import Robot
 from cartctl.model.state import State
@@ -75,16 +76,18 @@ class Controller:
         self.solver = get_solver(solver)
         self.level = get_level(level)
         self.level.check(self.solver)
+        self.level.check_robot(robot)
         _checked_switches(path_clock=path_clock, approach=approach)
         self._limits = usable_limits(limits, robot, self.solver, self.level)
         self.objective = _checked_objective(objective, self.solver)
         self.metric = metric
-        self._alone = Secondary()
         self._extend = getattr(self.solver, "gain", None) if self.solver.extends else None
         self.dt = checks.duration("dt", dt)
         _warn_of_unstable_gains(self.tasks, self.dt, self.level.stable_below)
         self.soft_start = checks.number("soft_start", soft_start, low=0.0)
-        self._metric = as_state_metric(metric, robot.nv)
+        self._metric = as_state_metric(metric, robot.nv, self.level.metrics)
+        self._weighing = metric if isinstance(metric, str) else "identity" if metric is None else ""
+        self._alone = self._secondary(0.0)
         self.solver.prepare()
         self._constraints, self._disabled, self._jerk, self._approach = constraints, disabled, jerk, approach
         clocked = _clocked(path_clock, self.tasks, self.solver, self.level)
@@ -143,6 +146,8 @@ class Controller:
         nothing had happened. A singularity is a status of ``command.solution``.
         """
         state = self.observe(q, v, t)
+        if self.level.loads is not None:
+            self.level.loads.time = t
         anchors = self._anchors if self._anchors is not None else [task.anchor(state) for task in self.tasks]
         metric = self._metric if self._metric is None or isinstance(self._metric, np.ndarray) else self._metric(state)
         started = t if self._started is None else self._started
@@ -155,22 +160,37 @@ class Controller:
         self._last = solution
         self.step_times = times
         self._clocks.tick(t, times, references, problem.equations, solution.u)
-        return self.level.command(solution, references)
+        return self.level.command(solution, references, state)
 
     def _solve(self, problem: Problem, state: State) -> Solution:
-        """The solver's answer, from the last one; a task with no feasible scale is slowed towards standing still."""
+        """The solver's answer, from the last one; where limits exclude each other they yield in their order.
+
+        A task with no feasible scale is slowed towards standing still.
+        """
         solution = self.solver.solve(problem, self._last)
-        scales = solution.scales
-        if (scales != scales).any():
-            again = towards_rest(problem, scales != scales, self.level.stopping(state, self.dt))
+        yielded: tuple[str, ...] = ()
+        if problem.constraints is not None and missed(solution):
+            yielded = ("constraints",)
+            if self._confining.yields:
+                problem, best, yielded = self._confining.widened(problem, state)
+                solution = self.solver.solve(problem)
+                if missed(solution):
+                    solution = Solution(problem, best, self.solver.name, status=Status.INFEASIBLE)
+        if _skipped(solution) or (self._confining.yields and solution.failed):
+            stopping = self._confining.stopping(problem, state)
+            again = towards_rest(problem, ~(solution.scales == 1.0), stopping)
             solution = self.solver.solve(again, solution)
-        solution.recovering = self._confining.recovering
+            if self._confining.yields and (_skipped(solution) or solution.failed):
+                skipped = np.full(len(again.equations), np.nan)  # what is left is to brake, within all bounds
+                solution = Solution(again, stopping, self.solver.name, status=Status.SKIPPED, scales=skipped)
+        solution.recovering, solution.yielded = self._confining.recovering, yielded
         return solution
 
     def _secondary(self, elapsed: float) -> Secondary:
         """The objective, its share rising as 3 x^2 - 2 x^3 over the soft start."""
         x = 1.0 if elapsed >= self.soft_start else max(elapsed, 0.0) / self.soft_start
-        return Secondary(self.objective, x * x * (3.0 - 2.0 * x), self._extend)
+        spends = "reference" in self.solver.honours
+        return Secondary(self.objective, x * x * (3.0 - 2.0 * x), self._extend, self._weighing, spends)
 
     def observe(self, q: FloatArray, v: FloatArray | None = None, t: float = 0.0) -> State:
         """The controller's own State, moved to (q, v); valid until the next call. Raises as :meth:`step`."""
@@ -196,6 +216,11 @@ class Controller:
     def anchors(self) -> list[Any]:
         """What each task holds on to since the first step."""
         return [None] * len(self.tasks) if self._anchors is None else self._anchors
+
+
+def _skipped(solution: Solution) -> bool:
+    """Whether a task has no feasible scale; of few numbers, a loop knows sooner than an array."""
+    return any(s != s for s in solution.scales.tolist())
 
 
 def _checked_tasks(tasks: Task | Sequence[Task], robot: Robot) -> tuple[Task, ...]:

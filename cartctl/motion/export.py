@@ -33,6 +33,12 @@ def table(run: Run) -> pa.Table:
             if poses is not None:
                 parts = ("x", "y", "z", "qx", "qy", "qz", "qw")[: poses.shape[1]]
                 columns |= {f"{task.name} {label} {part}": poses[:, i] for i, part in enumerate(parts)}
+    if run.torque is not None:
+        columns |= {f"torque {name}": _padded(run.torque[:, i]) for i, name in enumerate(joints)}
+    if run.energy is not None:
+        books = {"kinetic energy": "kinetic", "potential energy": "potential", "work of motors": "motors"}
+        books |= {"work lost in friction": "friction", "work of wrenches": "wrenches", "residual": "residual"}
+        columns |= {f"{title} [J]": getattr(run.energy, name) for title, name in books.items()}
     columns["status"] = [*run.status, None] if len(run.time) else []
     columns["solve time [s]"] = _padded(run.solve_time)
     return pa.table(columns)

@@ -36,7 +36,8 @@ class TaskMetrics:
 class JointMetrics:
     """One joint: its range, how close it came to its limits, peak rates, and how many samples lie outside a limit.
 
-    Ratios are peak over limit, None where there is no limit; position_margin is negative outside.
+    Ratios are peak over limit, None where there is no limit; position_margin is negative outside. peak_torque: N m or
+    N, None in a kinematic run.
     """
 
     name: str
@@ -49,6 +50,8 @@ class JointMetrics:
     velocity_ratio: float | None
     peak_acceleration: float
     acceleration_ratio: float | None
+    peak_torque: float | None
+    torque_ratio: float | None
     violations: int
 
 
@@ -58,13 +61,19 @@ class Metrics:
 
     path_drift: largest joint distance over a closed cycle, rad or m, None without one. effort: integral of
     ``||v||^2 dt``, rad^2/s or m^2/s, each command held over its step: v constant in it at the velocity level, linear
-    at the acceleration level.
+    above it. peak_torque: of any joint, N m or N; torque_effort: integral of ``||tau||^2 dt``; energy: integral of
+    ``sum |tau_i v_i| dt``, J, what motors spend that recover nothing; energy_residual: the largest imbalance of the
+    books, J. The four are None in a kinematic run.
     """
 
     tasks: list[TaskMetrics]
     joints: list[JointMetrics]
     path_drift: float | None
     effort: float
+    peak_torque: float | None
+    torque_effort: float | None
+    energy: float | None
+    energy_residual: float | None
     step_p50: float
     step_p99: float
     status: dict[str, int]
@@ -90,6 +99,7 @@ def measure(run: Run, after: float = 0.0) -> Metrics:
         joints=_joints(run),
         path_drift=_drift(run),
         effort=_effort(run),
+        **_torques(run),
         step_p50=float(p50),
         step_p99=float(p99),
         status=dict(Counter(run.status)),
@@ -102,6 +112,19 @@ def _effort(run: Run) -> float:
     before, after = run.v[:-1], run.v[1:]
     square = after**2 if run.meta.get("level") == "velocity" else (before**2 + before * after + after**2) / 3.0
     return float(np.sum(square) * run.meta["dt"])
+
+
+def _torques(run: Run) -> dict[str, float | None]:
+    """Figures of a run with dynamics; v linear in each step."""
+    torque, books, dt = run.torque, run.energy, run.meta["dt"]
+    if torque is None or books is None:
+        return dict.fromkeys(("peak_torque", "torque_effort", "energy", "energy_residual"))
+    return {
+        "peak_torque": float(np.abs(torque).max()),
+        "torque_effort": float(np.sum(torque**2) * dt),
+        "energy": float(np.sum(np.abs(torque * (run.v[:-1] + run.v[1:]))) * 0.5 * dt),
+        "energy_residual": float(np.abs(books.residual).max()),
+    }
 
 
 def _task(task: TaskRecord, kept: NDArray[np.bool_]) -> TaskMetrics:
@@ -127,6 +150,9 @@ def _joints(run: Run) -> list[JointMetrics]:
     a = np.diff(v, axis=0) / run.meta["dt"]
     outside = _outside(q, limits, "position") | _outside(v, limits, "velocity")
     outside[1:] |= _outside(a, limits, "acceleration")
+    torque = run.torque
+    if torque is not None:
+        outside[1:] |= _outside(torque, limits, "torque")
     return [
         JointMetrics(
             name=name,
@@ -141,6 +167,10 @@ def _joints(run: Run) -> list[JointMetrics]:
             velocity_ratio=_ratio(v[:, i], limits.velocity_lower[i], limits.velocity_upper[i]),
             peak_acceleration=float(np.abs(a[:, i]).max()),
             acceleration_ratio=_ratio(a[:, i], limits.acceleration_lower[i], limits.acceleration_upper[i]),
+            peak_torque=None if torque is None else float(np.abs(torque[:, i]).max()),
+            torque_ratio=None
+            if torque is None
+            else _ratio(torque[:, i], limits.torque_lower[i], limits.torque_upper[i]),
             violations=int(outside[:, i].sum()),
         )
         for i, name in enumerate(robot.dof_names)

@@ -14,14 +14,16 @@ from cartctl.algebra.svd import singular_values
 from cartctl.checks import FloatArray
 from cartctl.levels import Command
 from cartctl.motion.controller import Controller
+from cartctl.motion.mover import Driven, Mover
 from cartctl.motion.run import Run, TaskRecord
 
 
 class Recorder:
     """Arrays for ``steps`` steps of one controller, filled as it goes."""
 
-    def __init__(self, controller: Controller, steps: int, t0: float) -> None:
+    def __init__(self, controller: Controller, steps: int, t0: float, moves: Mover) -> None:
         robot = controller.robot
+        self._moves = moves
         self.steps = steps
         self._controller, self._t0 = controller, t0
         self._made = 0
@@ -46,7 +48,7 @@ class Recorder:
         for i, (rows, task) in enumerate(zip(self._tasks, controller.tasks, strict=True)):
             rows.error[k] = command.references[i].error
             rows.scale[k] = solution.scales[i]
-            rows.singular[k] = singular_values(np.asfortranarray(solution.problem.equations[i].A))
+            rows.singular[k] = singular_values(np.asfortranarray(task.jacobian(state)))
             rows.see(k, task.observe(state, times[i], controller.anchors[i]))
         self._made = k + 1
 
@@ -69,6 +71,7 @@ class Recorder:
         samples = n + 1 if self._made else 0
         controller = self._controller
         records = [rows.record(task, n, samples) for rows, task in zip(self._tasks, controller.tasks, strict=True)]
+        driven = self._moves if isinstance(self._moves, Driven) else None
         return Run(
             meta=_meta(controller, interrupted),
             time=self._t0 + controller.dt * np.arange(samples, dtype=np.float64),
@@ -78,6 +81,8 @@ class Recorder:
             status=self._status[:n],
             solve_time=self._spent[:n].copy(),
             tasks=records,
+            torque=None if driven is None else driven.torque[:n].copy(),
+            energy=None if driven is None else driven.books.first(samples),
             robot=controller.robot,
         )
 

@@ -12,6 +12,7 @@ from cartctl.checks import FloatArray
 from cartctl.errors import RunFileError
 from cartctl.files import whole_file
 from cartctl.model.robot import Robot
+from cartctl.motion.energy import EnergyBooks
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -43,9 +44,10 @@ class Run:
     """Every step of a rollout of N steps; made by :func:`cartctl.simulate` or :meth:`load`.
 
     time (N+1,) s, q (N+1, nq), v (N+1, nv): the states, the last one after the last step. command (N, nv): what the
-    level commands, velocities (rad/s, m/s) or accelerations (rad/s^2, m/s^2), by ``meta["level"]``. status (N,),
-    solve_time (N,) s: one a step. tasks: a TaskRecord each. meta: robot, solver and its parameters, level, dt, date,
-    versions, ``interrupted``.
+    level commands, velocities (rad/s, m/s), accelerations (rad/s^2, m/s^2) or torques (N m, N), by ``meta["level"]``.
+    status (N,), solve_time (N,) s: one a step. tasks: a TaskRecord each. torque (N, nv): what drove the plant, N m or
+    N, and energy: EnergyBooks of N+1 samples; None for a kinematic run. meta: robot, solver and its parameters, level,
+    dt, date, versions, ``interrupted``.
     """
 
     def __init__(
@@ -59,10 +61,13 @@ class Run:
         status: list[str],
         solve_time: FloatArray,
         tasks: list[TaskRecord],
+        torque: FloatArray | None = None,
+        energy: EnergyBooks | None = None,
         robot: Robot | None = None,
     ) -> None:
         self.meta, self.time, self.q, self.v = meta, time, q, v
         self.command, self.status, self.solve_time, self.tasks = command, status, solve_time, tasks
+        self.torque, self.energy = torque, energy
         self._robot = robot
 
     @property

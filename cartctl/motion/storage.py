@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import zipfile
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,7 @@ import numpy as np
 
 from cartctl.errors import ParameterError, RunFileError
 from cartctl.files import whole_file
+from cartctl.motion.energy import EnergyBooks
 from cartctl.motion.run import Run, TaskRecord
 
 _FORMAT = 1
@@ -35,6 +37,10 @@ def save(run: Run, path: Path) -> Path:
     for i, task in enumerate(run.tasks):
         header["tasks"].append({"name": task.name, "kind": task.kind, "frame": task.frame, "units": task.units})
         arrays.update({f"task{i}_{n}": getattr(task, n) for n in _TASK_ARRAYS if getattr(task, n) is not None})
+    if run.torque is not None:
+        arrays["torque"] = run.torque
+    if run.energy is not None:
+        arrays.update({f"energy_{f.name}": getattr(run.energy, f.name) for f in fields(EnergyBooks)})
     arrays["header"] = np.array(json.dumps(header))
     with whole_file(path) as part, part.open("wb") as file:
         np.savez_compressed(file, **arrays)
@@ -51,8 +57,16 @@ def load(path: Path) -> Run:
             raise RunFileError(f"{path} has format {header['format']}; expected {_FORMAT}, as this version writes")
         tasks = [_task(i, entry, arrays) for i, entry in enumerate(header["tasks"])]
         status = [header["status"][code] for code in arrays["status"]]
-        _check(arrays, tasks, path)
-        return Run(meta=header["meta"], status=status, tasks=tasks, **{n: arrays[n] for n in _ARRAYS})
+        books = [arrays[f"energy_{f.name}"] for f in fields(EnergyBooks) if f"energy_{f.name}" in arrays]
+        _check(arrays, tasks, path, books)
+        return Run(
+            meta=header["meta"],
+            status=status,
+            tasks=tasks,
+            torque=arrays.get("torque"),
+            energy=EnergyBooks(*books) if books else None,
+            **{n: arrays[n] for n in _ARRAYS},
+        )
     except FileNotFoundError:
         raise RunFileError(f"{path}: no such file; expected a .npz written by Run.save") from None
     except (KeyError, IndexError, TypeError, ValueError, EOFError, OSError, zipfile.BadZipFile) as error:
@@ -68,15 +82,18 @@ def _task(i: int, entry: dict[str, Any], arrays: dict[str, Any]) -> TaskRecord:
     return TaskRecord(**entry, **values)
 
 
-def _check(arrays: dict[str, Any], tasks: list[TaskRecord], path: Path) -> None:
+def _check(arrays: dict[str, Any], tasks: list[TaskRecord], path: Path, books: list[Any]) -> None:
     """One length throughout and nothing but finite numbers; raises RunFileError."""
     samples, steps = len(arrays["time"]), len(arrays["command"])
     per_sample = [arrays[n] for n in ("time", "q", "v")]
+    per_sample += books
     per_sample += [a for t in tasks for a in (t.error, t.singular_values, t.pose, t.target) if a is not None]
     per_step = [arrays["command"], arrays["solve_time"], arrays["status"], *(t.scale for t in tasks)]
+    torques = [arrays[n] for n in ("torque",) if n in arrays]
+    per_step += torques
     lengths = {len(a) for a in per_sample} == {samples} and {len(a) for a in per_step} == {steps}
     if not lengths or samples not in (steps + 1, 0):
         raise RunFileError(f"{path} holds arrays that do not belong together; expected N + 1 samples of N steps")
     scales = [np.nan_to_num(t.scale, nan=0.0) for t in tasks]  # nan where a task was skipped
-    if not all(np.isfinite(a).all() for a in [*per_sample, arrays["command"], arrays["solve_time"], *scales]):
+    if not all(np.isfinite(a).all() for a in [*per_sample, arrays["command"], arrays["solve_time"], *torques, *scales]):
         raise RunFileError(f"{path} holds nan or inf; expected the finite numbers that Run.save writes")
