@@ -169,7 +169,7 @@ def test_ranked_position_and_orientation(name, kind, solver):
         *(("plane", "sns", level, 0.0) for level in ("velocity", "acceleration")),
         *(("plane", solver, "acceleration", 0.0) for solver in ("hqp", "qp")),
         ("box", "sns", "velocity", 5e-4),  # m: where the box of accelerations and the rows contradict each other
-        ("box", "sns", "acceleration", 0.0),
+        ("box", "sns", "acceleration", 1e-4),  # as above, at an edge; 5e-5 seen, or none, by the last digits
         ("box", "hqp", "acceleration", 1e-3),
     ],
 )
