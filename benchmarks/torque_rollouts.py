@@ -62,14 +62,13 @@ def start(rng, robot, limits):
     return q
 
 
-def rollout(robot, limits, rng, steps, solver="sns", level="torque"):
-    """One start: a random dt, gain, metric and set of tasks, targets that jump now and then."""
-    dt = float(10.0 ** rng.uniform(-3.3, -2.0))
+def rollout(robot, limits, rng, steps, solver="sns", level="torque", slowest=-2.3):
+    """One start: a random dt from 0.5 ms to 10^slowest s, gain, metric and tasks, targets that jump now and then."""
+    dt = float(10.0 ** rng.uniform(-3.3, slowest))
     hand = cc.FrameTask(robot.tool, ("pose", "position")[int(rng.integers(2))], gain=float(rng.uniform(1.0, 0.2 / dt)))
     tasks = [hand, cc.PostureTask(gain=3.0)] if rng.random() < 0.5 else [hand]
     metric = METRICS[int(rng.integers(3))] if level == "torque" else None
-    damping = 5.0 if metric in METRICS[1:] else 1.0
-    how = cc.TorqueLevel(damping) if level == "torque" else cc.AccelerationLevel(damping)
+    how = cc.TorqueLevel() if level == "torque" else cc.AccelerationLevel(damping=5.0)
     controller = cc.Controller(robot, tasks, solver, how, limits=limits, metric=metric, dt=dt)
     body = cc.Plant().body(robot)
     q, v, tally, calm = start(rng, robot, limits), np.zeros(robot.nv), Tally(), True
@@ -89,12 +88,12 @@ def rollout(robot, limits, rng, steps, solver="sns", level="torque"):
     return tally
 
 
-def many(robot_name, solver, level, seeds, steps):
+def many(robot_name, solver, level, seeds, steps, slowest):
     """Several starts in one process."""
     robot, total = cc.load(robot_name), Tally()
     limits = limits_of(robot)
     for seed in seeds:
-        total.add(rollout(robot, limits, np.random.default_rng(seed), steps, solver, level))
+        total.add(rollout(robot, limits, np.random.default_rng(seed), steps, solver, level, slowest))
     return total
 
 
@@ -123,6 +122,7 @@ def main():
     parser.add_argument("--robots", default="panda,lwr")
     parser.add_argument("--solvers", default="sns")
     parser.add_argument("--levels", default="torque")
+    parser.add_argument("--slowest", type=float, default=5.0, help="the longest step in ms; the shortest is 0.5")
     parser.add_argument("--starts", type=int, default=100)
     parser.add_argument("--steps", type=int, default=500)
     parser.add_argument("--workers", type=int, default=os.cpu_count())
@@ -130,17 +130,20 @@ def main():
     options = parser.parse_args()
     from harness import save_rows, setting, show
 
-    rows = []
+    rows, slowest = [], float(np.log10(options.slowest * 1e-3))
     with ProcessPoolExecutor(options.workers) as pool:
         for robot in options.robots.split(","):
             for solver in options.solvers.split(","):
                 for level in options.levels.split(","):
                     shares = np.array_split(np.arange(options.starts), 4 * options.workers)
-                    jobs = [pool.submit(many, robot, solver, level, s, options.steps) for s in shares if len(s)]
+                    jobs = [
+                        pool.submit(many, robot, solver, level, s, options.steps, slowest) for s in shares if len(s)
+                    ]
                     total = Tally()
                     for job in jobs:
                         total.add(job.result())
-                    rows.append(row(robot, solver, level, options.starts, total))
+                    steps_ms = {"dt_ms": f"0.5 to {options.slowest:g}"}
+                    rows.append(row(robot, solver, level, options.starts, total) | steps_ms)
     show("Torque-controlled rollouts", rows)
     if options.save:
         save_rows(RESULTS, rows, setting())

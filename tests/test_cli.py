@@ -121,6 +121,30 @@ def test_track_follows_the_circle_and_writes_what_it_names(arm: str) -> None:
         assert re.search(rf"^{joint} ", result.stdout, re.MULTILINE)
 
 
+def test_the_panda_is_driven_by_torques(plain: None, tmp_path: Path) -> None:
+    options = ("--level", "torque", "--out", str(tmp_path), "--dt", "0.002", "--duration", "0.8")
+    result = cartctl("track", "panda", *options, "--solver", "sns")
+    assert result.exit_code == 0, result.output
+    assert_readable(result.stdout)
+    assert "torque level, metric inverse-inertia" in " ".join(result.stdout.split()) and "enforced" in result.stdout
+    run = cc.Run.load(tmp_path / "panda-circle-sns.npz")
+    assert run.meta["level"] == "torque" and run.meta["metric"] == "inverse-inertia"
+    figures = run.metrics()
+    assert figures.tasks[0].rms_m < 0.2e-3 and figures.peak_torque > 10.0
+    assert number(figures.peak_torque) in result.stdout and "torque  outside" in result.stdout
+    floating = cartctl("track", "talos", "--root-joint", "free_flyer", *options)
+    assert "without a motor" in the_error(floating)
+
+
+def test_metrics_are_those_of_the_level(plain: None, tmp_path: Path) -> None:
+    options = ("--out", str(tmp_path), "--dt", "0.01", "--duration", "0.1")
+    of_torques = cartctl("track", "panda", "--level", "torque", "--metric", "inertia", *options)
+    assert "'inverse-inertia'" in the_error(of_torques)
+    assert "'inertia'" in the_error(cartctl("track", "panda", "--metric", "inverse-inertia", *options))
+    assert cartctl("track", "panda", "--metric", "inertia", *options).exit_code == 0
+    assert cc.Run.load(tmp_path / "panda-circle-projected-gradient.npz").meta["metric"] == "inertia"
+
+
 def test_the_panda_tracks_its_whole_pose(plain: None, tmp_path: Path) -> None:
     result = cartctl("track", "panda", "--out", str(tmp_path), "--dt", "0.01")
     assert result.exit_code == 0, result.output

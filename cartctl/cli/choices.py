@@ -8,6 +8,7 @@ from cartctl.errors import LookupFailure, ParameterError
 
 PATHS = ("circle", "line", "ellipse", "lissajous", "polygon")
 PLANES = ("xy", "xz", "yz", "yx", "zx", "zy")
+METRICS = ("identity", "inertia", "joint-limits", "inverse-inertia", "inverse-inertia-squared")
 OBJECTIVES = ("joint-range", "none")
 
 

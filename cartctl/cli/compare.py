@@ -33,6 +33,7 @@ def compare(
     laps: options.Laps = 1,
     solver: options.SolverNames = None,
     level: options.LevelName = "velocity",
+    metric: options.MetricName = None,
     gain: options.Gain = 20.0,
     damping: options.Damping = None,
     objective: options.ObjectiveName = None,
@@ -57,7 +58,7 @@ def compare(
         course = Course(
             Place(robot, package_dir, root_joint, home, frame, axes),
             Way(path, plane, size, period, laps),
-            Pace(level, gain, dt, duration),
+            Pace(level, metric, gain, dt, duration),
         )
         contest = Contest(course, method.solver_list(solver or (), damping), goal)
         place = files.Files(out_dir, course.robot.name, path, "compare")

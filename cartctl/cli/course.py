@@ -17,6 +17,7 @@ from cartctl.errors import ParameterError
 from cartctl.tasks.axes import pose_rows
 
 _SETTLE = 0.5  # s after the path's end
+_TORQUE_METRIC = "inverse-inertia"
 _SOFT_START = 0.5  # s in which the objective rises, so that the rates do not jump
 
 
@@ -45,9 +46,10 @@ class Way:
 
 @dataclass(frozen=True)
 class Pace:
-    """The options that tell how it is followed: gain in 1/s, step in s, duration in s."""
+    """The options that tell how it is followed: level, metric, gain in 1/s, step in s, duration in s."""
 
     level: str
+    metric: str | None
     gain: float
     dt: float
     duration: float | None
@@ -84,9 +86,15 @@ class Course:
         """The loop that follows it; raises as :class:`cartctl.Controller`."""
         pace = self._pace
         return cc.Controller(
-            self.robot, self.task, solver, pace.level, objective=objective, dt=pace.dt,
+            self.robot, self.task, solver, pace.level, objective=objective, metric=self._metric(solver), dt=pace.dt,
             soft_start=_SOFT_START, **limit_options(solver, pace.level),
         )  # fmt: skip
+
+    def _metric(self, solver: cc.Solver) -> str | None:
+        """The one asked for; of torques, the dynamically consistent one where the solver takes any."""
+        if self._pace.metric is not None or self._pace.level != "torque":
+            return self._pace.metric
+        return _TORQUE_METRIC if solver.takes_metric else None
 
     def facts(self) -> list[tuple[str, str]]:
         """What it is, defaults included."""
@@ -99,8 +107,10 @@ class Course:
         ]
 
     def pace(self) -> str:
-        """Level, gain and step."""
-        return f"{self._pace.level} level, gain {self.task.gain:g} 1/s, step {1e3 * self._pace.dt:g} ms"
+        """Level, metric, gain and step."""
+        weighed = self._pace.metric or (_TORQUE_METRIC if self._pace.level == "torque" else None)
+        metric = f", metric {weighed}" if weighed else ""
+        return f"{self._pace.level} level{metric}, gain {self.task.gain:g} 1/s, step {1e3 * self._pace.dt:g} ms"
 
     @property
     def spare(self) -> int:

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from cartctl.cli.choices import OBJECTIVES, PATHS, PLANES, completion, robots, solver_names, words
+from cartctl.cli.choices import METRICS, OBJECTIVES, PATHS, PLANES, completion, robots, solver_names, words
 
 _HAND, _PATH, _METHOD, _RESULT = "The robot", "The path", "The method", "The result"
 
@@ -92,9 +92,18 @@ SolverNames = Annotated[
 LevelName = Annotated[
     str,
     typer.Option(
-        "--level", metavar="NAME", rich_help_panel=_METHOD, help="What is commanded: velocity or acceleration."
+        "--level", metavar="NAME", rich_help_panel=_METHOD, help="What is commanded: velocity, acceleration or torque.",
+        autocompletion=words(("velocity", "acceleration", "torque")),
     ),
-]
+]  # fmt: skip
+MetricName = Annotated[
+    str | None,
+    typer.Option(
+        "--metric", metavar="NAME", rich_help_panel=_METHOD, autocompletion=words(METRICS),
+        help="Of what the redundancy leaves open: identity, inertia, joint-limits; of torques, identity, "
+        "inverse-inertia (the default there) or inverse-inertia-squared.",
+    ),
+]  # fmt: skip
 Gain = Annotated[float, typer.Option("--gain", metavar="1/S", rich_help_panel=_METHOD, help="How fast errors decay.")]
 Damping = Annotated[
     float | None,

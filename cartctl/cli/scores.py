@@ -46,7 +46,9 @@ def _hand(task: TaskMetrics) -> Table:
 
 
 def _joints(joints: list[JointMetrics], ascii_only: bool) -> Table:
-    table = columns("joint", "range used", "margin", "rate", "accel.", "outside")
+    driven = any(joint.peak_torque is not None for joint in joints)
+    last = ["torque", "outside"] if driven else ["outside"]
+    table = columns("joint", "range used", "margin", "rate", "accel.", *last)
     for joint in joints:
         outside = Text(str(joint.violations), style="bold red") if joint.violations else Text("-")
         table.add_row(
@@ -55,6 +57,7 @@ def _joints(joints: list[JointMetrics], ascii_only: bool) -> Table:
             number(joint.position_margin),
             _percent(joint.velocity_ratio),
             _percent(joint.acceleration_ratio),
+            *([_percent(joint.torque_ratio)] if driven else []),
             outside,
         )
     return table
@@ -91,6 +94,9 @@ def _whole(metrics: Metrics) -> Table:
     scale = min(task.min_scale for task in metrics.tasks)
     if scale < 1.0:
         rows.append(("slowest", f"{100 * scale:.0f} % of the speed asked for"))
+    if metrics.peak_torque is not None and metrics.energy is not None:
+        most = f"{number(metrics.peak_torque)} N m or N at the most"
+        rows.append(("torques", f"{most}; {number(metrics.energy)} J by motors that recover nothing"))
     rows.append(("time a step", f"{number(1e6 * metrics.step_p50)} us median, {number(1e6 * metrics.step_p99)} us p99"))
     counts = sorted(metrics.status.items(), key=lambda item: -item[1])
     rows.append(("status", ", ".join(f"{name} {count}" for name, count in counts) + f" of {metrics.steps} steps"))

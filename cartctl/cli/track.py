@@ -33,6 +33,7 @@ def track(
     laps: options.Laps = 1,
     solver: options.SolverName = "projected-gradient",
     level: options.LevelName = "velocity",
+    metric: options.MetricName = None,
     gain: options.Gain = 20.0,
     damping: options.Damping = None,
     objective: options.ObjectiveName = None,
@@ -55,7 +56,7 @@ def track(
         course = Course(
             Place(robot, package_dir, root_joint, home, frame, axes),
             Way(path, plane, size, period, laps),
-            Pace(level, gain, dt, duration),
+            Pace(level, metric, gain, dt, duration),
         )
         controller = course.controller(how, purpose.objective)
         place = files.Files(out_dir, course.robot.name, path, how.name)

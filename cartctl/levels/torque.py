@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -13,36 +13,28 @@ from cartctl.algebra.svd import scale
 from cartctl.checks import FloatArray, is_finite
 from cartctl.constraints import Box, Constraint, Rows
 from cartctl.dynamics.friction import Friction
-from cartctl.levels.acceleration import AccelerationLevel, damping_of, spread_over
+from cartctl.levels.acceleration import AccelerationLevel, damping_of
 from cartctl.levels.acceleration_bounds import AccelerationBounds
-from cartctl.levels.base import UNCONFINED, Command, Confines, Level, Motion, Secondary, direction, require_finite
+from cartctl.levels.base import UNCONFINED, Command, Confines, Level, Motion, Secondary, require_finite
 from cartctl.levels.bounds import JointBounds
 from cartctl.levels.inertia import by_inertia, singular
 from cartctl.levels.loads import Loads, require_actuated
 from cartctl.levels.metrics import DYNAMIC, Named
-from cartctl.levels.torque_bounds import Blocks
+from cartctl.levels.torque_bounds import through_inertia_rows
 from cartctl.levels.torque_kernel import through_inertia
+from cartctl.levels.torque_reference import drawn_to
 from cartctl.model.robot import Robot
 from cartctl.model.state import State
 from cartctl.model.wrench import Wrench
 from cartctl.solvers import Solver
 from cartctl.tasks.base import Reference, Task
 
-DAMPING = 20.0  # 1/s
 _NONE = np.zeros(0)
-_MAPPED = ("inverse-inertia", "inverse-inertia-squared")  # the metrics under which damping goes through M
 
 
-class Asked(NamedTuple):
-    """What tasks of m rows in all ask of a: ``J a + drift = r_ddot + 2 k (r_dot - J v) + k^2 e``; sizes: rows each.
-
-    rest: drift, error, rate, acceleration, k, or k of each row, for the kernel.
-    """
-
-    J: FloatArray
-    rest: tuple[Any, ...]
-    sizes: tuple[int, ...]
-    references: list[Reference]
+# What tasks of m rows ask of a, ``J a + drift = r_ddot + 2 k (r_dot - J v) + k^2 e``: J; drift, error, rate,
+# acceleration, k, or k of each row, for the kernel; rows of each; the references. A bare tuple, for a hot loop.
+Asked = tuple[FloatArray, tuple[Any, ...], Sequence[int], list[Reference]]
 
 
 class TorqueLevel(Level):
@@ -115,23 +107,16 @@ class TorqueLevel(Level):
         rows, sides = np.empty((m + r, nv)), np.empty((2, m + r))
         if not self._kernel(M, h, state.v, J, *rest, low, high, rows, sides):
             raise singular(state)
-        equations = []
-        start = 0
-        for task, size in zip(tasks, sizes, strict=True):
-            end = start + size
-            A, b, drift = rows[start:end], sides[0, start:end], sides[1, start:end]
-            if not (is_finite(b) and is_finite(drift)):
-                require_finite(b, f"the command of task {task.name!r}")
-                require_finite(drift, f"the drift of task {task.name!r}")
-            natural = task.size(state)
-            if natural:
-                natural *= _stretch(J[start:end], A)
-            equations.append(Equation.trusted(A, b, drift, task.fit, task.weight, task.name, natural))
+        asked, known = sides
+        equations, start = [], 0
+        for k, task in enumerate(tasks):
+            end = start + sizes[k]
+            equations.append(_equation(task, state, J[start:end], rows[start:end], asked[start:end], known[start:end]))
             start = end
-        blocks = (rows[m:], sides[0, m:], sides[1, m:]) if r else None
+        blocks = (rows[m:], asked[m:], known[m:]) if r else None
         if outside is not None:
-            blocks = _with_rows(state, h, blocks, outside)
-        u0 = self._reference(state, secondary, h)
+            blocks = through_inertia_rows(state, h, blocks, outside)
+        u0 = drawn_to(state, h, secondary, self.damping)
         least, most = (None, None) if torque is None else torque
         return Problem.trusted(tuple(equations), metric, u0, least, most, blocks), references
 
@@ -152,26 +137,11 @@ class TorqueLevel(Level):
             rate = _NONE if reference.rate is None else reference.rate
             acceleration = _NONE if reference.acceleration is None else reference.acceleration
             k = (0.0, gain) if isinstance(gain, np.ndarray) else (gain, _NONE)
-            return Asked(J, (drift, reference.error, rate, acceleration, *k), (J.shape[0],), [reference])
+            return J, (drift, reference.error, rate, acceleration, *k), J.shape[:1], [reference]
         confines = Confines(confines.lower, confines.upper, None, confines.approach)
         problem, references = self._motion.problem(state, tasks, times, anchors, Secondary(), None, confines)
         J, b, drift = (np.concatenate([getattr(e, name) for e in problem.equations]) for name in ("A", "b", "drift"))
-        return Asked(J, (drift, b, _NONE, b, 0.0, _NONE), problem.sizes, references)
-
-    def _reference(self, state: State, secondary: Secondary, h: FloatArray) -> FloatArray | None:
-        """``h - D v`` and the objective's direction, or both through M; None for the classical form."""
-        if not secondary.spends:
-            return None
-        mapped, objective = secondary.weighing in _MAPPED, secondary.objective
-        D = self.damping
-        if D is None:
-            D = DAMPING if mapped else _default(state.mass_matrix.diagonal())
-        elif not self._damps and objective is None:
-            return None
-        u0 = spread_over(D, state.robot.nv) * -state.v
-        if objective is not None:
-            u0 = u0 + secondary.share * direction(objective, state)
-        return h + (state.mass_matrix @ u0 if mapped else u0)
+        return J, (drift, b, _NONE, b, 0.0, _NONE), problem.sizes, references
 
     def rows(self, constraint: Constraint, state: State, dt: float, box: Box | None) -> Rows:
         """The rows of a constraint on a."""
@@ -192,22 +162,18 @@ class TorqueLevel(Level):
         return Command(solution, references, torque=solution.u)
 
 
-def _default(inertia: FloatArray) -> FloatArray:
-    """D in N m s/rad for joints of these inertias: enough for the heavy ones, not too stiff for the light ones."""
-    return np.minimum(3.0 + 10.0 * inertia, 300.0 * inertia)
+def _equation(task: Task, state: State, J: FloatArray, A: FloatArray, b: FloatArray, drift: FloatArray) -> Equation:
+    """One task's rows; raises NonFiniteError."""
+    if not (is_finite(b) and is_finite(drift)):
+        require_finite(b, f"the command of task {task.name!r}")
+        require_finite(drift, f"the drift of task {task.name!r}")
+    natural = task.size(state)
+    if natural:
+        natural *= _stretch(J, A)
+    return Equation.trusted(A, b, drift, task.fit, task.weight, task.name, natural)
 
 
 def _stretch(J: FloatArray, A: FloatArray) -> float:
     """How much larger ``A = J M^-1`` is than J."""
     size = scale(J)
     return scale(A) / size if size > 0.0 else 1.0
-
-
-def _with_rows(state: State, h: FloatArray, rows: Blocks | None, outside: Blocks) -> Blocks:
-    """``rows``, and below them those of constraints on a: ``l + C M^-1 h <= C M^-1 tau <= u + C M^-1 h``."""
-    C = by_inertia(state, outside[0])
-    shift = C @ h
-    more = (C, outside[1] + shift, outside[2] + shift)
-    if rows is None:
-        return more
-    return tuple(np.concatenate(pair) for pair in zip(rows, more, strict=True))  # type: ignore[return-value]
