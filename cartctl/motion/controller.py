@@ -77,7 +77,7 @@ class Controller:
         self.level.check(self.solver)
         _checked_switches(path_clock=path_clock, approach=approach)
         self._limits = usable_limits(limits, robot, self.solver, self.level)
-        self.objective = _checked_objective(objective, self.solver)
+        self.objective = _checked_objective(objective, self.solver, robot)
         self.metric = metric
         self._alone = Secondary()
         self._extend = getattr(self.solver, "gain", None) if self.solver.extends else None
@@ -226,7 +226,7 @@ def _clocked(asked: bool | None, tasks: Sequence[Task], solver: Solver, level: L
     return [bool(waits) for _ in tasks]
 
 
-def _checked_objective(objective: Objective | None, solver: Solver) -> Objective | None:
+def _checked_objective(objective: Objective | None, solver: Solver, robot: Robot) -> Objective | None:
     if objective is None:
         if solver.extends:
             raise ProblemError(
@@ -243,6 +243,7 @@ def _checked_objective(objective: Objective | None, solver: Solver) -> Objective
         raise UnsupportedProblem(
             f"solver {solver.name!r} has no null-space term for an objective; use {able}, or objective=None"
         )
+    objective.check(robot)
     return objective
 
 
