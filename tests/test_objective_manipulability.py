@@ -120,9 +120,9 @@ def test_values_are_those_of_the_analysis(name: str) -> None:
         assert cc.Manipulability(**rows).value(state) == pytest.approx(spectrum.manipulability, rel=1e-10)
         assert cc.SmallestSingularValue(**rows).value(state) == pytest.approx(spectrum.values[-1], rel=1e-8)
         assert cc.InverseCondition(**rows).value(state) == pytest.approx(1.0 / spectrum.condition, rel=1e-8)
-        speed = cc.VelocityRatio(direction=d, **rows).value(state)
+        speed = cc.VelocityRatio(along=d, **rows).value(state)
         assert speed == pytest.approx(analysis.velocity_ellipsoid(A).along(d), rel=1e-6)
-        effort = cc.TorquePerForce(direction=d, **rows).value(state)
+        effort = cc.TorquePerForce(along=d, **rows).value(state)
         assert effort == pytest.approx(1.0 / analysis.force_ellipsoid(A).along(d), rel=1e-8)
 
 
@@ -144,7 +144,7 @@ def test_more_rows_than_joints() -> None:
     assert w.value(state) == pytest.approx(math.sqrt(np.linalg.det(J.T @ J)), rel=1e-12)
     slope = cc.FunctionObjective(w.value).gradient(state)
     np.testing.assert_allclose(w.gradient(state), slope, atol=1e-9)
-    upwards = cc.VelocityRatio(direction=[0, 0, 1, 0, 0, 0])  # no joint moves it out of its plane
+    upwards = cc.VelocityRatio(along=[0, 0, 1, 0, 0, 0])  # no joint moves it out of its plane
     assert upwards.value(state) == 0.0 and not upwards.gradient(state).any()
 
 
@@ -196,17 +196,17 @@ def test_coinciding_singular_values() -> None:
 def test_a_velocity_ratio_vanishes_with_a_finite_slope(angle: float) -> None:
     """Radially, a stretched 2R: H = l1 l2 |sin q2| / |J_x|, with slope l1 l2 / |J_x| as q2 goes to 0."""
     l1, l2 = 0.8, 0.5
-    robot, radial = cc.planar([l1, l2]), cc.VelocityRatio(axes="xy", direction=[1.0, 0.0])
+    robot, radial = cc.planar([l1, l2]), cc.VelocityRatio(axes="xy", along=[1.0, 0.0])
     state = robot.state([0.0, angle])
     J = state.jacobian("tool")[:2]
     expected = abs(np.linalg.det(J)) / np.linalg.norm(J[1])
     assert radial.value(state) == pytest.approx(expected, rel=1e-3, abs=1e-15)
     slope = l1 * l2 / math.hypot(l1 + l2, l2)
     assert radial.gradient(state)[1] == pytest.approx(slope, rel=1e-2)
-    across = cc.VelocityRatio(axes="xy", direction=[0.0, 1.0])
+    across = cc.VelocityRatio(axes="xy", along=[0.0, 1.0])
     assert across.value(robot.state([0.0, 0.0])) == pytest.approx(math.hypot(l1 + l2, l2))  # the other way is open
-    assert cc.TorquePerForce(axes="xy", direction=[1.0, 0.0]).value(robot.state([0.0, 0.0])) == 0.0
-    assert not cc.TorquePerForce(axes="xy", direction=[1.0, 0.0]).gradient(robot.state([0.0, 0.0])).any()
+    assert cc.TorquePerForce(axes="xy", along=[1.0, 0.0]).value(robot.state([0.0, 0.0])) == 0.0
+    assert not cc.TorquePerForce(axes="xy", along=[1.0, 0.0]).gradient(robot.state([0.0, 0.0])).any()
 
 
 # ---------------------------------------------------------------- scaling
@@ -239,7 +239,7 @@ def test_a_common_scale_of_the_joints_comes_out() -> None:
         np.testing.assert_allclose(kind(**twice).gradient(state), 2.0**power * kind().gradient(state), rtol=1e-8)
     for kind in (cc.VelocityRatio, cc.TorquePerForce):
         np.testing.assert_allclose(
-            kind(direction=d, **twice).gradient(state), 2.0 * kind(direction=3.0 * d).gradient(state), rtol=1e-8
+            kind(along=d, **twice).gradient(state), 2.0 * kind(along=3.0 * d).gradient(state), rtol=1e-8
         )
 
 
@@ -248,7 +248,7 @@ def test_scales_from_the_limits() -> None:
     state = robot.state(robot.random_configuration(np.random.default_rng(8)))
     by_name, given = cc.Manipulability(scale="limits"), cc.Manipulability(scale=robot.limits.velocity_upper)
     np.testing.assert_allclose(by_name.gradient(state), given.gradient(state), rtol=1e-12)
-    down = {"axes": "position", "direction": [0.0, 0.0, -1.0]}
+    down = {"axes": "position", "along": [0.0, 0.0, -1.0]}
     by_name = cc.TorquePerForce(scale="limits", **down)
     given = cc.TorquePerForce(scale=1.0 / robot.limits.torque_upper, **down)
     np.testing.assert_allclose(by_name.gradient(state), given.gradient(state), rtol=1e-12)
@@ -278,9 +278,9 @@ def test_joints_without_a_rate_are_out() -> None:
         (lambda: cc.Manipulability(gain=-1.0), ParameterError, "gain is -1"),
         (lambda: cc.Manipulability(scale="limit"), ParameterError, "scale is 'limit'; expected None, 'limits'"),
         (lambda: cc.Manipulability(scale=[-1.0] * 7), ParameterError, "at least 0"),
-        (lambda: cc.VelocityRatio(axes="xy"), ParameterError, r"direction is None; expected \(2,\)"),
-        (lambda: cc.VelocityRatio(axes="xy", direction=[0.0, 0.0]), ParameterError, "not zero"),
-        (lambda: cc.TorquePerForce(axes="xy", direction=[1.0, 0.0, 0.0]), ShapeError, r"\(2,\)"),
+        (lambda: cc.VelocityRatio(axes="xy"), ParameterError, r"along is None; expected \(2,\)"),
+        (lambda: cc.VelocityRatio(axes="xy", along=[0.0, 0.0]), ParameterError, "not zero"),
+        (lambda: cc.TorquePerForce(axes="xy", along=[1.0, 0.0, 0.0]), ShapeError, r"\(2,\)"),
     ],
 )
 def test_misuse(make, error: type[Exception], words: str) -> None:

@@ -41,6 +41,7 @@ def test_the_arithmetic() -> None:
         (3 * (a - 2.0 * b) + c, 3 * ga - 6 * gb + gc),
         (cc.WeightedSum([(0.5, a), (0.25, b + c)]), 0.5 * ga + 0.25 * (gb + gc)),
         (a * 2 * 3, 6 * ga),
+        (np.float64(2.0) * a + np.int64(3) * b, 2 * ga + 3 * gb),
     ):
         np.testing.assert_allclose(made.direction(state), expected, rtol=1e-12, atol=1e-15)
         assert all(not isinstance(o, cc.WeightedSum) for _, o in made.terms)

@@ -166,7 +166,9 @@ class Solution:
     def holds(self, fits: Sequence[str] = ("scale", "least_squares", "inequality")) -> bool:
         """The same of the equations of the given fits only; a skipped one does not hold."""
         pairs = zip(self.problem.equations, self.scales, strict=True)
-        return all(_holds(e, s, self.u) for e, s in pairs if e.weight > 0.0 and e.fit in fits)
+        reference = self.problem.reference
+        size = norm(self.u) if reference is None else norm(self.u) + norm(reference)  # what round-off is relative to
+        return all(_holds(e, s, self.u, size) for e, s in pairs if e.weight > 0.0 and e.fit in fits)
 
     @property
     def task_part(self) -> FloatArray:
@@ -232,7 +234,7 @@ def _sides(values: FloatArray, lower: FloatArray | None, upper: FloatArray | Non
     return sides
 
 
-def _holds(e: Equation | Inequality, s: float, u: FloatArray) -> bool:
+def _holds(e: Equation | Inequality, s: float, u: FloatArray, size: float) -> bool:
     """Whether ``A u + d = s b`` up to what round-off may leave: of each row, and of a backward stable solve."""
     if isinstance(e, Inequality):
         finite = np.where(np.isfinite(e.lower), np.abs(e.lower), 0.0) + np.where(np.isfinite(e.upper), e.upper, 0.0)
@@ -240,7 +242,7 @@ def _holds(e: Equation | Inequality, s: float, u: FloatArray) -> bool:
     if s != s:
         return False
     rhs = e.rhs if s == 1.0 else s * e.b - (0.0 if e.drift is None else e.drift)
-    stable = 64.0 * float(np.finfo(np.float64).eps) * scale(e.A) * norm(u)
+    stable = 64.0 * float(np.finfo(np.float64).eps) * scale(e.A) * size
     with np.errstate(over="ignore", invalid="ignore"):
         allowed = 1e-9 * (np.abs(e.A) @ np.abs(u) + np.abs(rhs)) + stable
         return bool((np.abs(e.A @ u - rhs) <= allowed).all() and np.isfinite(allowed).all())

@@ -24,6 +24,7 @@ class Objective(ABC):
 
     gain: float
     maximise: bool = False
+    __array_ufunc__ = None  # so that numpy's numbers leave ``factor * objective`` to __rmul__
 
     @abstractmethod
     def value(self, state: State) -> float:

@@ -15,19 +15,19 @@ from cartctl.objectives.frame_measure import FrameMeasure
 
 @dataclass(frozen=True, eq=False)
 class DirectionalMeasure(FrameMeasure):
-    """A measure along ``direction`` (m,), one number a row of ``axes``, any length but 0, angular ones times length."""
+    """A measure along ``along`` (m,), one number a row of ``axes``, any length but 0, angular ones times length."""
 
-    direction: Any = None
+    along: Any = None
     _unit: FloatArray = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         super().__post_init__()
         rows = len(self._rows)
-        if self.direction is None:
-            raise ParameterError(f"direction is None; expected ({rows},) numbers, one a row of axes {self.axes!r}")
-        d = checks.vector("direction", self.direction, rows)
+        if self.along is None:
+            raise ParameterError(f"along is None; expected ({rows},) numbers, one a row of axes {self.axes!r}")
+        d = checks.vector("along", self.along, rows)
         size = float(np.linalg.norm(d))
         if size == 0.0:
-            raise ParameterError(f"direction is {d}; expected a vector that is not zero")
-        object.__setattr__(self, "direction", d)
+            raise ParameterError(f"along is {d}; expected a vector that is not zero")
+        object.__setattr__(self, "along", d)
         object.__setattr__(self, "_unit", d / size)

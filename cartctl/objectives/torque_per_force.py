@@ -15,15 +15,15 @@ from cartctl.objectives.scaling import check_scale, reciprocal
 
 @dataclass(frozen=True, eq=False)
 class TorquePerForce(DirectionalMeasure):
-    """The norm of the joint torques that a unit force along ``direction`` takes (minimised; Chiu 1988).
+    """The norm of the joint torques that a unit force in one direction takes (minimised; Chiu 1988).
 
     ``H = ||A^T d||`` with ``A = R J D``, d the unit direction: one over the force transmission ratio
     ``beta = (d^T A A^T d)^-1/2``, which is infinite where the structure itself carries the force and H is 0.
     ``dH/dq_i = (A^T d) . (dA_i^T d) / H``, and 0 where H is.
 
-    scale: diag D weighs torques; ``"limits"`` is one over the torque limits. direction: (m,), one number a row of
-    ``axes``, any length but 0. frame, axes, length, gain as in :class:`cartctl.Manipulability`. Raises ParameterError,
-    ShapeError, NonFiniteError.
+    scale: diag D weighs torques; ``"limits"`` is one over the torque limits. along: (m,), the direction, one number a
+    row of ``axes``, any length but 0. frame, axes, length, gain as in :class:`cartctl.Manipulability`. Raises
+    ParameterError, ShapeError, NonFiniteError.
     """
 
     def check(self, robot: Robot) -> None:

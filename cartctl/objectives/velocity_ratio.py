@@ -15,14 +15,14 @@ _ABSENT = 1e-12  # parts of the direction below this are round-off
 
 @dataclass(frozen=True, eq=False)
 class VelocityRatio(DirectionalMeasure):
-    """The speed of the frame along ``direction`` at joint rates of norm 1 (maximised; Chiu 1988).
+    """The speed of the frame in one direction at joint rates of norm 1 (maximised; Chiu 1988).
 
     ``H = (d^T (A A^T)^-1 d)^-1/2``, d the unit direction: how far the velocity ellipsoid of ``A = R J D`` reaches.
     ``dH/dq_i = H^3 x^T dA_i A^T x`` with ``x = (A A^T)^-1 d``. With ``t_k = H d_k / sigma_k``, a unit vector, this is
     ``sum_kl (H/sigma_k) t_k t_l u_k^T dA_i v_l``, where H/sigma_k has a limit as sigma_k goes to 0: at a singularity
     that takes d away, H = 0 and the gradient is finite.
 
-    direction: (m,), one number a row of ``axes``, any length but 0. frame, axes, length, scale, gain as in
+    along: (m,), the direction, one number a row of ``axes``, any length but 0. frame, axes, length, scale, gain as in
     :class:`cartctl.Manipulability`. Raises ParameterError, ShapeError, NonFiniteError.
     """
 
