@@ -78,7 +78,7 @@ _HOMES = {
         "VelocityRatio",
         "WeightedSum",
     ),
-    "cartctl.levels": ("AccelerationLevel", "Command"),
+    "cartctl.levels": ("AccelerationLevel", "Avoid", "Command", "Halt", "SlowDown"),
     "cartctl.motion.controller": ("Controller",),
     "cartctl.motion.simulate": ("simulate",),
     "cartctl.motion.run": ("Run", "TaskRecord"),
@@ -125,7 +125,10 @@ if TYPE_CHECKING:  # editors and mypy see what __getattr__ finds
     from cartctl.errors import CartctlWarning as CartctlWarning
     from cartctl.errors import RunInterrupted as RunInterrupted
     from cartctl.levels import AccelerationLevel as AccelerationLevel
+    from cartctl.levels import Avoid as Avoid
     from cartctl.levels import Command as Command
+    from cartctl.levels import Halt as Halt
+    from cartctl.levels import SlowDown as SlowDown
     from cartctl.levels.metrics import JointLimitMetric as JointLimitMetric
     from cartctl.model.library import robots as robots
     from cartctl.model.limits import Limits as Limits

@@ -41,7 +41,7 @@ class Status(Enum):
         "the tasks get what is left."
     )
     SINGULAR = (
-        "A task lost rank here: motion in the lost directions is left out or damped; "
+        "A task lost rank here: motion in the lost directions is left out, damped or slowed; "
         "move away from the singularity or drop an axis."
     )
     FAILED = "The numbers over- or underflowed; u was set to zero. Check the scale of the matrices."
@@ -82,6 +82,7 @@ class Solution:
         "_scales",
         "_status",
         "_task_part",
+        "guarded",
         "lost_rank",
         "problem",
         "recovering",
@@ -104,6 +105,7 @@ class Solution:
         self.u = u
         self.solver = solver
         self.lost_rank = lost_rank
+        self.guarded = False  # set by a controller whose singularity policy took part of a command
         self.recovering = False  # set by a controller whose limits had to bring a joint back
         self.warm: Any = None  # what the same solver may start from next time
         self._method = method
@@ -148,6 +150,8 @@ class Solution:
     def status(self) -> Status:
         """How it went: RECOVERING where joints are being brought back, else the outcome."""
         outcome = self.outcome
+        if self.guarded and outcome is Status.OPTIMAL:  # of what the policy left
+            outcome = Status.SINGULAR
         return Status.RECOVERING if self.recovering and outcome is not Status.FAILED else outcome
 
     @property

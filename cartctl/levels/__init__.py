@@ -5,11 +5,23 @@ from __future__ import annotations
 from cartctl.errors import LevelNotFound, ParameterError
 from cartctl.levels.acceleration import AccelerationLevel
 from cartctl.levels.base import Command, Level, Secondary
+from cartctl.levels.singularity_policies import Avoid, Halt, SlowDown
 from cartctl.levels.velocity import VelocityLevel
 
 _REGISTRY: dict[str, type[Level]] = {"velocity": VelocityLevel, "acceleration": AccelerationLevel}
 
-__all__ = ["AccelerationLevel", "Command", "Level", "Secondary", "VelocityLevel", "get_level", "levels"]
+__all__ = [
+    "AccelerationLevel",
+    "Avoid",
+    "Command",
+    "Halt",
+    "Level",
+    "Secondary",
+    "SlowDown",
+    "VelocityLevel",
+    "get_level",
+    "levels",
+]
 
 
 def levels() -> list[str]:
