@@ -63,8 +63,22 @@ _HOMES = {
         "Task",
     ),
     "cartctl.constraints": ("Constraint", "FrameBox", "FrameSpeed", "HalfSpace"),
-    "cartctl.objectives": ("JointRange", "Objective"),
-    "cartctl.levels": ("AccelerationLevel", "Command", "TorqueLevel"),
+    "cartctl.objectives": (
+        "FunctionObjective",
+        "GravityTorque",
+        "InverseCondition",
+        "JointRange",
+        "KineticEnergy",
+        "Manipulability",
+        "Objective",
+        "Posture",
+        "SmallestSingularValue",
+        "TorqueDistribution",
+        "TorquePerForce",
+        "VelocityRatio",
+        "WeightedSum",
+    ),
+    "cartctl.levels": ("AccelerationLevel", "Avoid", "Command", "Halt", "SlowDown", "TorqueLevel"),
     "cartctl.dynamics.friction": ("Friction",),
     "cartctl.model.payload": ("Payload",),
     "cartctl.model.wrench": ("Wrench",),
@@ -118,7 +132,10 @@ if TYPE_CHECKING:  # editors and mypy see what __getattr__ finds
     from cartctl.errors import CartctlWarning as CartctlWarning
     from cartctl.errors import RunInterrupted as RunInterrupted
     from cartctl.levels import AccelerationLevel as AccelerationLevel
+    from cartctl.levels import Avoid as Avoid
     from cartctl.levels import Command as Command
+    from cartctl.levels import Halt as Halt
+    from cartctl.levels import SlowDown as SlowDown
     from cartctl.levels import TorqueLevel as TorqueLevel
     from cartctl.levels.metrics import JointLimitMetric as JointLimitMetric
     from cartctl.model.library import robots as robots
@@ -140,8 +157,19 @@ if TYPE_CHECKING:  # editors and mypy see what __getattr__ finds
     from cartctl.motion.run import Run as Run
     from cartctl.motion.run import TaskRecord as TaskRecord
     from cartctl.motion.simulate import simulate as simulate
+    from cartctl.objectives import FunctionObjective as FunctionObjective
+    from cartctl.objectives import GravityTorque as GravityTorque
+    from cartctl.objectives import InverseCondition as InverseCondition
     from cartctl.objectives import JointRange as JointRange
+    from cartctl.objectives import KineticEnergy as KineticEnergy
+    from cartctl.objectives import Manipulability as Manipulability
     from cartctl.objectives import Objective as Objective
+    from cartctl.objectives import Posture as Posture
+    from cartctl.objectives import SmallestSingularValue as SmallestSingularValue
+    from cartctl.objectives import TorqueDistribution as TorqueDistribution
+    from cartctl.objectives import TorquePerForce as TorquePerForce
+    from cartctl.objectives import VelocityRatio as VelocityRatio
+    from cartctl.objectives import WeightedSum as WeightedSum
     from cartctl.paths import Circle as Circle
     from cartctl.paths import Ellipse as Ellipse
     from cartctl.paths import Line as Line

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cartctl import Equation, Problem, solve
+from cartctl import Equation, Problem, Status, solve
 from cartctl.solvers import get_solver, solvers_that_honour
 from tests import oracles
 from tests import tolerances as tol
@@ -151,3 +151,14 @@ def test_zero_and_empty_equations():
         (multipliers,) = solution.multipliers
         assert multipliers.shape == (A.shape[0],) and not multipliers.any()
         assert not solution.task_part.any() and solution.null_part == pytest.approx([1.0, 2.0, 3.0])
+
+
+def test_what_round_off_leaves_of_a_large_reference_is_no_miss():
+    """u0 of 700 that the bounds cut to 1e-3: what is left of the task is round-off of u0, not of u."""
+    rng = np.random.default_rng(4)
+    for solver in ("sns", "projected-gradient"):
+        for _ in range(50):
+            A, u0 = rng.normal(size=(6, 7)), 700.0 * rng.normal(size=7)
+            bounds = {"lower": np.full(7, -1e-3), "upper": np.full(7, 1e-3)} if solver == "sns" else {}
+            assert solve(Problem([(A, np.zeros(6))], reference=u0, **bounds), solver).status is Status.OPTIMAL
+            assert solve(Problem([(A, np.zeros(6))]), "pinv").status is Status.OPTIMAL

@@ -42,6 +42,33 @@ def test_frame_drift_is_the_classical_acceleration(name: str, seed: int) -> None
     assert np.linalg.norm(state.drift(robot.tool)[:3]) > 1e-3
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_kinematic_hessian(name: str, seed: int) -> None:
+    """By differences, and against the drift, which Pinocchio works out another way: J_dot v = (H v) v."""
+    robot, rng = ROBOTS[name](), np.random.default_rng(seed)
+    state = random_state(robot, rng)
+    for frame in {robot.tool, *rng.choice(robot.frame_names[1:], 2)}:
+        H = state.hessian(frame)
+        assert H.shape == (6, robot.nv, robot.nv) and not H.flags.writeable
+        for i, e in enumerate(STEP * np.eye(robot.nv)):
+            slope = (along(robot, state, e).jacobian(frame) - along(robot, state, -e).jacobian(frame)) / (2 * STEP)
+            np.testing.assert_allclose(H[:, :, i], slope, atol=2e-8)
+        np.testing.assert_allclose(H @ state.v @ state.v, state.drift(frame), atol=1e-11 * (1 + state.v @ state.v))
+
+
+def test_gravity_and_inertia_gradients(name: str) -> None:
+    robot, rng = ROBOTS[name](), np.random.default_rng(6)
+    state, a = random_state(robot, rng), rng.normal(size=robot.nv)
+    for quantity, slopes in (
+        (lambda s: s.gravity, state.gravity_gradient),
+        (lambda s: s.mass_matrix @ a, state.inertia_gradient(a)),
+    ):
+        size = 1 + np.abs(slopes).max()
+        for i, e in enumerate(STEP * np.eye(robot.nv)):
+            slope = (quantity(along(robot, state, e)) - quantity(along(robot, state, -e))) / (2 * STEP)
+            np.testing.assert_allclose(slopes[:, i], slope, atol=1e-8 * size)
+
+
 def test_centre_of_mass(name: str) -> None:
     robot = ROBOTS[name]()
     state = random_state(robot, np.random.default_rng(7))
@@ -70,6 +97,9 @@ QUANTITIES = {
     "jacobian": lambda s, f: s.jacobian(f),
     "twist": lambda s, f: s.twist(f),
     "drift": lambda s, f: s.drift(f),
+    "hessian": lambda s, f: s.hessian(f),
+    "gravity_gradient": lambda s, f: s.gravity_gradient,
+    "inertia_gradient": lambda s, f: s.inertia_gradient(np.arange(1.0, s.robot.nv + 1.0)),
     "mass_matrix": lambda s, f: s.mass_matrix,
     "nonlinear_effects": lambda s, f: s.nonlinear_effects,
     "gravity": lambda s, f: s.gravity,

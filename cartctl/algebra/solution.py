@@ -45,7 +45,7 @@ class Status(Enum):
         "the tasks get what is left."
     )
     SINGULAR = (
-        "A task lost rank here: motion in the lost directions is left out or damped; "
+        "A task lost rank here: motion in the lost directions is left out, damped or slowed; "
         "move away from the singularity or drop an axis."
     )
     FAILED = "The numbers over- or underflowed; u was set to zero. Check the scale of the matrices."
@@ -86,6 +86,7 @@ class Solution:
         "_scales",
         "_status",
         "_task_part",
+        "guarded",
         "lost_rank",
         "problem",
         "recovering",
@@ -109,6 +110,7 @@ class Solution:
         self.u = u
         self.solver = solver
         self.lost_rank = lost_rank
+        self.guarded = False  # set by a controller whose singularity policy took part of a command
         self.recovering = False  # set by a controller whose limits had to bring a joint back
         self.yielded: tuple[str, ...] = ()  # set by a controller: the classes of limits that gave way, the first first
         self.warm: Any = None  # what the same solver may start from next time
@@ -154,6 +156,8 @@ class Solution:
     def status(self) -> Status:
         """How it went: YIELDED where limits gave way, RECOVERING where joints come back, or the outcome."""
         outcome = self.outcome
+        if self.guarded and outcome is Status.OPTIMAL:  # of what the policy left
+            outcome = Status.SINGULAR
         if self.yielded and outcome not in (Status.FAILED, Status.INFEASIBLE):
             return Status.YIELDED
         return Status.RECOVERING if self.recovering and outcome is not Status.FAILED else outcome
@@ -179,7 +183,9 @@ class Solution:
     def holds(self, fits: Sequence[str] = ("scale", "least_squares", "inequality")) -> bool:
         """The same of the equations of the given fits only; a skipped one does not hold."""
         pairs = zip(self.problem.equations, self.scales, strict=True)
-        return all(_holds(e, s, self.u) for e, s in pairs if e.weight > 0.0 and e.fit in fits)
+        reference = self.problem.reference
+        size = norm(self.u) if reference is None else norm(self.u) + norm(reference)  # what round-off is relative to
+        return all(_holds(e, s, self.u, size) for e, s in pairs if e.weight > 0.0 and e.fit in fits)
 
     @property
     def task_part(self) -> FloatArray:
@@ -245,7 +251,7 @@ def _sides(values: FloatArray, lower: FloatArray | None, upper: FloatArray | Non
     return sides
 
 
-def _holds(e: Equation | Inequality, s: float, u: FloatArray) -> bool:
+def _holds(e: Equation | Inequality, s: float, u: FloatArray, size: float) -> bool:
     """Whether ``A u + d = s b`` up to what round-off may leave: of each row, and of a backward stable solve."""
     if isinstance(e, Inequality):
         finite = np.where(np.isfinite(e.lower), np.abs(e.lower), 0.0) + np.where(np.isfinite(e.upper), e.upper, 0.0)
@@ -253,7 +259,7 @@ def _holds(e: Equation | Inequality, s: float, u: FloatArray) -> bool:
     if s != s:
         return False
     rhs = e.rhs if s == 1.0 else s * e.b - (0.0 if e.drift is None else e.drift)
-    stable = 64.0 * float(np.finfo(np.float64).eps) * scale(e.A) * norm(u)
+    stable = 64.0 * float(np.finfo(np.float64).eps) * scale(e.A) * size
     with np.errstate(over="ignore", invalid="ignore"):
         allowed = 1e-9 * (np.abs(e.A) @ np.abs(u) + np.abs(rhs)) + stable
         return bool((np.abs(e.A @ u - rhs) <= allowed).all() and np.isfinite(allowed).all())

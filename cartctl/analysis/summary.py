@@ -66,7 +66,7 @@ def summary(
 
     Raises FrameNotFound, ParameterError, ShapeError, NonFiniteError, MetricError.
     """
-    from cartctl.tasks.axes import pose_rows  # the rest of this package works without Pinocchio
+    from cartctl.model.axes import pose_rows  # the rest of this package works without Pinocchio
 
     rows = np.array(pose_rows(axes))
     scale = checks.number("length", length, low=0.0, strict=True)

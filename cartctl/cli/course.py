@@ -14,7 +14,7 @@ from cartctl.cli.hand import Hand
 from cartctl.cli.method import limit_options
 from cartctl.cli.shapes import Shape
 from cartctl.errors import ParameterError
-from cartctl.tasks.axes import pose_rows
+from cartctl.model.axes import pose_rows
 
 _SETTLE = 0.5  # s after the path's end
 _TORQUE_METRIC = "inverse-inertia"

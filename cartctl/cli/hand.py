@@ -12,8 +12,8 @@ import pinocchio as pin
 
 from cartctl.checks import FloatArray
 from cartctl.errors import ParameterError
+from cartctl.model.axes import pose_rows
 from cartctl.model.robot import Robot
-from cartctl.tasks.axes import pose_rows
 
 LETTERS = "xyz"
 _SINGULAR = 1e-6  # of the largest singular value

@@ -5,6 +5,7 @@ from __future__ import annotations
 from cartctl.errors import LevelNotFound, ParameterError
 from cartctl.levels.acceleration import AccelerationLevel
 from cartctl.levels.base import Command, Level, Secondary
+from cartctl.levels.singularity_policies import Avoid, Halt, SlowDown
 from cartctl.levels.torque import TorqueLevel
 from cartctl.levels.velocity import VelocityLevel
 
@@ -14,7 +15,19 @@ _REGISTRY: dict[str, type[Level]] = {
     "torque": TorqueLevel,
 }
 
-__all__ = ["AccelerationLevel", "Command", "Level", "Secondary", "TorqueLevel", "VelocityLevel", "get_level", "levels"]
+__all__ = [
+    "AccelerationLevel",
+    "Avoid",
+    "Command",
+    "Halt",
+    "Level",
+    "Secondary",
+    "SlowDown",
+    "TorqueLevel",
+    "VelocityLevel",
+    "get_level",
+    "levels",
+]
 
 
 def levels() -> list[str]:

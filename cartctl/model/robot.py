@@ -11,6 +11,7 @@ import pinocchio as pin
 from cartctl import checks
 from cartctl.checks import FloatArray
 from cartctl.errors import ConfigurationError, FrameNotFound, JointNotFound, ParameterError
+from cartctl.model.hessian import carried
 from cartctl.model.limits import Limits
 from cartctl.model.payload import Payload, carrying
 from cartctl.model.state import State
@@ -23,10 +24,12 @@ _UNIT = 1e-6  # how far a quaternion or (cos, sin) pair may be from unit norm
 class Robot:
     """A robot as data, made by :func:`cartctl.load` or from a Pinocchio model of your own (which is copied).
 
-    model: the Pinocchio model. nq, nv: sizes of q and v. joint_names: movable joints in order, single_joints
-    those of one dof. continuous: (nv,) which turn without end. dof_names: (nv,) one
-    name a tangent coordinate. limits: Limits, (nv,) each. home: (nq,) a posture away from singularities. tool: the name
-    of the tool frame. spec: what :func:`cartctl.load` needs to load it again, None for a model of your own.
+    model: the Pinocchio model. nq, nv: sizes of q and v. joint_names: movable joints in order, single_joints those of
+    one dof. continuous: (nv,) which turn without end. single: (nv,) which are a joint of their own, and not of a moving
+    base. dof_names: (nv,) one name a tangent coordinate. limits: Limits, (nv,) each. home: (nq,) a posture away from
+    singularities. tool: the name of the tool frame. mimics: whether joints mimic others. carried: (nv, nv), whether dof
+    i carries the axis of dof j, as [i, j]. spec: what :func:`cartctl.load` needs to load it again, None for a model of
+    your own.
 
     Raises FrameNotFound, JointNotFound.
     """
@@ -60,6 +63,11 @@ class Robot:
         self.continuous = np.zeros(model.nv, dtype=bool)
         for joint in self._joints.values():
             self.continuous[joint.idx_v] = joint.nq == 2 and joint.nv == 1
+        self.single = np.zeros(model.nv, dtype=bool)
+        for name in self.single_joints:
+            self.single[self._joints[name].idx_v] = True
+        self.mimics = len(model.mimicking_joints) > 0
+        self.carried = carried(model)
         self._plain = all(j.nq == j.nv for j in self._joints.values())
         self.neutral = _read_only(pin.neutral(model))
         self.has_plain_coordinates = self._plain and not self.neutral.any()  # q itself is comparable with the limits

@@ -8,6 +8,8 @@ import numpy as np
 import pinocchio as pin
 
 from cartctl.checks import FloatArray
+from cartctl.model.differences import central
+from cartctl.model.hessian import kinematic_hessian
 
 if TYPE_CHECKING:
     from cartctl.model.robot import Robot
@@ -114,6 +116,15 @@ class State:
             self._cache[key] = _frozen(motion.vector)
         return self._cache[key]
 
+    def hessian(self, frame: str) -> FloatArray:
+        """``dJ_aj / dq_i``, (6, nv, nv) as [a, j, i]: how :meth:`jacobian` changes along each tangent coordinate.
+
+        Exact, in m and rad a rad (or m) squared; with mimic joints, central differences.
+        """
+        if self.robot.mimics:
+            return self._once("H " + frame, lambda: central(self, lambda s: s.jacobian(frame)))
+        return self._once("H " + frame, lambda: kinematic_hessian(self.jacobian(frame), self.robot.carried))
+
     @property
     def mass_matrix(self) -> FloatArray:
         """``M(q)``, (nv, nv), symmetric."""
@@ -140,6 +151,25 @@ class State:
     def gravity(self) -> FloatArray:
         """``g(q)``, (nv,): gravity torques, N m."""
         return self._once("g", lambda: pin.computeGeneralizedGravity(self._model, self._data, self.q))
+
+    @property
+    def gravity_gradient(self) -> FloatArray:
+        """``dg_j / dq_i``, (nv, nv) as [j, i], N m/rad; with mimic joints, central differences."""
+        if self.robot.mimics:
+            return self._once("dg", lambda: central(self, lambda s: s.gravity))
+        self._accelerated = False  # overwritten by what follows
+        return self._once(
+            "dg", lambda: _square(pin.computeGeneralizedGravityDerivatives(self._model, self._data, self.q))
+        )
+
+    def inertia_gradient(self, a: FloatArray) -> FloatArray:
+        """``d(M(q) a)_j / dq_i`` of a constant a (nv,), (nv, nv) as [j, i]; with mimic joints, central differences."""
+        if self.robot.mimics:
+            return central(self, lambda s: s.mass_matrix @ a)
+        self._accelerated = False  # overwritten by what follows
+        at_rest = np.zeros(self._model.nv)
+        turned = pin.computeRNEADerivatives(self._model, self._data, self.q, at_rest, a)[0]
+        return _square(np.array(turned)) - self.gravity_gradient
 
     @property
     def com(self) -> FloatArray:
@@ -185,3 +215,8 @@ def _frozen(array: Any) -> FloatArray:
     copy = np.array(array, dtype=np.float64)
     copy.flags.writeable = False
     return copy
+
+
+def _square(A: FloatArray) -> FloatArray:
+    """A as a matrix; with one joint, Pinocchio hands out a vector."""
+    return A.reshape(-1, 1) if A.ndim < 2 else A

@@ -17,6 +17,7 @@ from cartctl.constraints import Constraint
 from cartctl.errors import CartctlWarning, NoTasksError, ParameterError, ProblemError, UnsupportedProblem
 from cartctl.levels import Command, Level, Secondary, get_level
 from cartctl.levels.metrics import as_state_metric
+from cartctl.levels.singularity import Guard
 from cartctl.levels.yielding import missed
 from cartctl.model.limits import Limits
 from cartctl.model.robot import Robot
@@ -46,6 +47,10 @@ class Controller:
     whether ``limits.jerk_*`` are kept, too. path_clock: whether a path waits for a hand that is slowed down, so that it
     stays on its path; by default where the solver scales, at the velocity level. approach: whether commands are held
     back, under limits, so that the robot can stop at its target, at the edge of its reach and at the constraints.
+    singularity: what becomes of a task near a singularity of its own Jacobian, whatever the solver: ``"truncate"``,
+    ``"damp"``, ``"slow-down"``, ``"avoid"``, ``"halt"``, an inverse policy such as ``cc.Damped(0.05)``,
+    ``cc.SlowDown(0.1)``, ``cc.Avoid(2.0)``, ``cc.Halt(0.02)``, or None: the solver's own business. Where a command was
+    cut, the status is SINGULAR, and the solution's problem is what was left of it.
 
     Raises NoTasksError, ProblemError, TimeStepError, FrameNotFound, JointNotFound, SolverNotFound, LevelNotFound,
     UnsupportedProblem, MetricError, ParameterError, NonFiniteError.
@@ -68,6 +73,7 @@ class Controller:
         jerk: bool = False,
         path_clock: bool | None = None,
         approach: bool = True,
+        singularity: Any = None,
     ) -> None:
         if not isinstance(robot, Robot):
             raise ParameterError(f"robot is a {type(robot).__name__}; expected a Robot from cc.load(...)")
@@ -79,7 +85,10 @@ class Controller:
         self.level.check_robot(robot)
         _checked_switches(path_clock=path_clock, approach=approach)
         self._limits = usable_limits(limits, robot, self.solver, self.level)
-        self.objective = _checked_objective(objective, self.solver)
+        self._guard = Guard(singularity, self.level, robot, self.tasks)
+        self.objective = self._guard.objective(_checked_objective(objective, self.solver, robot))
+        if self.objective is not objective:
+            _checked_objective(self.objective, self.solver, robot)
         self.metric = metric
         self._extend = getattr(self.solver, "gain", None) if self.solver.extends else None
         self.dt = checks.duration("dt", dt)
@@ -90,7 +99,7 @@ class Controller:
         self._alone = self._secondary(0.0)
         self.solver.prepare()
         self._constraints, self._disabled, self._jerk, self._approach = constraints, disabled, jerk, approach
-        clocked = _clocked(path_clock, self.tasks, self.solver, self.level)
+        clocked = _clocked(path_clock, self.tasks, self.solver.scales or self._guard.waits, self.level)
         self._clocks = PathClocks(clocked)
         self._waiting = [task for task, waits in zip(self.tasks, clocked, strict=True) if waits]
         self._confining = self._confined_by(self._limits)
@@ -109,6 +118,7 @@ class Controller:
         self._last = None
         self._clocks.reset()
         self._confining.reset()
+        self._guard.reset()
 
     @property
     def limits(self) -> Limits | None:
@@ -155,12 +165,27 @@ class Controller:
         times = self._clocks.times(t)
         confines = self._confining.at(state)
         problem, references = self.level.problem(state, self.tasks, times, anchors, secondary, metric, confines)
-        solution = self._solve(problem, state)
+        left, guarded, halted = self._guard.guard(problem, state)
+        solution = self._halt(left, state) if halted else self._solve(left, state)
+        solution.guarded = guarded
         self._anchors, self._started = anchors, started  # only now: a refused step leaves no trace
         self._last = solution
         self.step_times = times
         self._clocks.tick(t, times, references, problem.equations, solution.u)
         return self.level.command(solution, references, state)
+
+    @property
+    def halted(self) -> bool:
+        """Whether ``singularity="halt"`` has stopped the robot; :meth:`reset` lets it go on."""
+        return self._guard.halted
+
+    def _halt(self, problem: Problem, state: State) -> Solution:
+        """To rest, as fast as the bounds allow; no task is followed."""
+        u = problem.clip(self._confining.stopping(problem, state))
+        still = np.zeros(len(problem.equations))
+        solution = Solution(problem, u, self.solver.name, status=Status.SINGULAR, scales=still)
+        solution.recovering = self._confining.recovering
+        return solution
 
     def _solve(self, problem: Problem, state: State) -> Solution:
         """The solver's answer, from the last one; where limits exclude each other they yield in their order.
@@ -243,15 +268,15 @@ def _checked_switches(**switches: Any) -> None:
             raise ParameterError(f"{name} is {value!r}; expected True or False")
 
 
-def _clocked(asked: bool | None, tasks: Sequence[Task], solver: Solver, level: Level) -> list[bool]:
-    """Which tasks have a path that waits: by default every one, where the solver scales and the level can."""
+def _clocked(asked: bool | None, tasks: Sequence[Task], slowed: bool, level: Level) -> list[bool]:
+    """Which tasks have a path that waits: by default every one, where commands are slowed and the level can."""
     if asked and not level.clocked:
         raise UnsupportedProblem(f"level {level.name!r} has no path clock; use level 'velocity', or path_clock=False")
-    waits = level.clocked and (solver.scales if asked is None else asked)
+    waits = level.clocked and (slowed if asked is None else asked)
     return [bool(waits) for _ in tasks]
 
 
-def _checked_objective(objective: Objective | None, solver: Solver) -> Objective | None:
+def _checked_objective(objective: Objective | None, solver: Solver, robot: Robot) -> Objective | None:
     if objective is None:
         if solver.extends:
             raise ProblemError(
@@ -268,6 +293,7 @@ def _checked_objective(objective: Objective | None, solver: Solver) -> Objective
         raise UnsupportedProblem(
             f"solver {solver.name!r} has no null-space term for an objective; use {able}, or objective=None"
         )
+    objective.check(robot)
     return objective
 
 

@@ -8,9 +8,9 @@ import numpy as np
 
 from cartctl.algebra.svd import scale
 from cartctl.checks import FloatArray
+from cartctl.model.axes import pose_rows
 from cartctl.model.robot import Robot
 from cartctl.model.state import State
-from cartctl.tasks.axes import pose_rows
 from cartctl.tasks.base import Observation, Reference, Task
 from cartctl.tasks.target import point_target, read
 

@@ -10,12 +10,11 @@ import numpy as np
 from cartctl import checks
 from cartctl.checks import FloatArray
 from cartctl.errors import ShapeError, TargetError
+from cartctl.model.differences import central
 from cartctl.model.robot import Robot
 from cartctl.model.state import State
 from cartctl.tasks.base import Reference, Task
 from cartctl.tasks.target import point_target
-
-_STEP = 6e-6  # cube root of the round-off: where a central difference is at its best
 
 
 class FunctionTask(Task):
@@ -73,7 +72,7 @@ class FunctionTask(Task):
     def jacobian(self, state: State) -> FloatArray:
         """``J`` (m, nv)."""
         if self._jacobian is None:
-            return self._differences(state)
+            return central(state, self.value)
         J = checks.matrix(f"task {self.name!r}: jacobian", np.atleast_2d(self._jacobian(state)), columns=state.robot.nv)
         m = len(self.value(state))
         if J.shape[0] != m:
@@ -118,13 +117,6 @@ class FunctionTask(Task):
             for n, p in zip(names, parts, strict=True)
         )
         return Reference(wanted - value, rate, acceleration)
-
-    def _differences(self, state: State) -> FloatArray:
-        columns = []
-        for step in _STEP * np.eye(state.robot.nv):
-            ahead, behind = self.value(self._moved(state, step)), self.value(self._moved(state, -step))
-            columns.append((ahead - behind) / (2.0 * _STEP))
-        return np.array(columns).T  # type: ignore[no-any-return]
 
     @staticmethod
     def _moved(state: State, displacement: FloatArray) -> State:

@@ -18,10 +18,10 @@ from cartctl import checks
 from cartctl.algebra.svd import scale, svd
 from cartctl.checks import FloatArray
 from cartctl.errors import CartctlWarning
+from cartctl.model.axes import pose_rows
 from cartctl.model.robot import Robot
 from cartctl.model.state import State
 from cartctl.spatial import EULER_SEQUENCES, euler_angles, euler_rates, pose_error
-from cartctl.tasks.axes import pose_rows
 from cartctl.tasks.base import Reference, Task
 from cartctl.tasks.target import Goal, pose_target, read
 

@@ -1,4 +1,4 @@
-"""Which rows of a pose a task controls: "pose", "position", "orientation", "xy", "z rx ry", or a mask."""
+"""Which rows of a pose are meant: "pose", "position", "orientation", "xy", "z rx ry", or a mask."""
 
 from __future__ import annotations
 

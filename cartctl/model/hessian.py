@@ -1,0 +1,41 @@
+"""The kinematic Hessian of a frame from the columns of its Jacobian: how J turns as the joints move.
+
+A joint i nearer to the root carries the whole motion field of joint j with it, frame included, so that both halves of
+column j turn with its angular velocity: ``d(v_j, w_j)/dq_i = (w_i x v_j, w_i x w_j)``. A joint i nearer to the frame
+leaves the field of j and moves only the frame within it: ``d(v_j, w_j)/dq_i = (w_j x v_i, 0)``. Joints that the frame
+does not hang on have columns of zeros, and so have their derivatives.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from cartctl.checks import FloatArray
+
+# Joints of several dofs whose rates are those of the body: each of them turns with all of them.
+_OF_THE_BODY = ("FreeFlyer", "Planar", "Spherical")
+
+
+def carried(model: pin.Model) -> NDArray[np.bool_]:
+    """(nv, nv): whether column j of a Jacobian turns with dof i, [i, j], wherever both move the same frame."""
+    order = np.arange(model.nv)
+    for joint in model.joints:
+        if joint.nv > 1 and joint.shortname().removeprefix("JointModel") in _OF_THE_BODY:
+            order[joint.idx_v : joint.idx_v + joint.nv] = joint.idx_v
+    return order[:, None] <= order[None]
+
+
+def kinematic_hessian(J: FloatArray, carried: NDArray[np.bool_]) -> FloatArray:
+    """``dJ_aj / dq_i``, (6, nv, nv) as [a, j, i], of a LOCAL_WORLD_ALIGNED J (6, nv)."""
+    n = J.shape[1]
+    w = np.zeros((n, 3, 3))  # S(w_i)
+    w[:, 2, 1], w[:, 0, 2], w[:, 1, 0] = J[3:]
+    w -= w.transpose(0, 2, 1)
+    crossed = w @ np.concatenate([J[:3], J[3:]], axis=1)  # [i, xyz, j]: w_i x v_j, and then w_i x w_j
+    linear, angular = crossed[:, :, :n].transpose(1, 2, 0), crossed[:, :, n:].transpose(1, 2, 0)
+    H = np.empty((6, n, n))
+    H[:3] = np.where(carried.T, linear, linear.transpose(0, 2, 1))
+    np.multiply(angular, carried.T, out=H[3:])
+    return H
