@@ -367,3 +367,13 @@ def test_the_same_without_the_compiler():
 
 def test_parameters():
     assert SNS() == SNS() and SNS().name == "sns"
+
+
+def test_round_off_of_equations_is_no_share_of_a_bound():
+    """A hand at a plane that is in its way: the plane's proof is of equations alone, and the method went round."""
+    given = json.loads((Path(__file__).parent / "data" / "hand_at_a_plane.json").read_text())
+    A, b, lower, upper, C, c_lower, c_upper = (np.array(given[k]) for k in given)
+    problem = Problem([(A, b)], lower=lower, upper=upper, constraints=(C, np.full_like(c_lower, -np.inf), c_upper))
+    solution = solve(problem, "sns")
+    assert solution.status is Status.SCALED
+    assert solution.certificate().holds()

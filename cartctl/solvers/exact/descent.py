@@ -52,6 +52,7 @@ _CLEARLY = 1e-6  # of a unit normal: a guess that adds less is left out
 _SUMMED = 1e-12  # of the terms of a sum: round-off
 _TOUCHED = 1e-9  # of the size of u: and in no case more than this
 _BLURRED = 1e-7  # of the size of u: and no more than this where rows that nearly depend on each other magnify it
+_PASSED_ON = 1e-2  # of an equation's coefficient: 1e-13 of it may be in those of inequalities
 _LEAST = 1e-3  # coefficients below this are not what others are compared with
 
 
@@ -116,11 +117,11 @@ def independence(w: WorkingSet) -> float:
 
 @part
 def largest_coefficient(w: WorkingSet) -> float:
-    """The size that coefficients of inequalities in ``r`` are compared with."""
+    """The size that coefficients of inequalities in ``r`` are compared with: theirs, or the round-off of the others."""
     largest = _LEAST
     for j in range(w.K[NUM, 0]):
-        if w.K[KIND, j] != FIXED:
-            largest = max(largest, abs(w.V[SUM, j]))
+        share = abs(w.V[SUM, j])
+        largest = max(largest, share if w.K[KIND, j] != FIXED else _PASSED_ON * share)
     return largest
 
 
