@@ -65,7 +65,7 @@ class JointBounds:
         self.limits = limits
         self.jerk = jerk
         self._shape = limits.position_lower.shape
-        self.packed = _packed(limits, _mask(disabled, self._shape[0]), jerk)
+        self._packed = _packed(limits, _mask(disabled, self._shape[0]), jerk)
         self._before: FloatArray | None = None
         kernel: Kernel[..., bool] = jerk_bounds if jerk else velocity_bounds
         self._kernel = kernel.compiled
@@ -76,13 +76,18 @@ class JointBounds:
             raise ShapeError(f"q and v have shapes {q.shape} and {v.shape}; expected {self._shape} each")
         lower, upper = np.empty(self._shape), np.empty(self._shape)
         if not self.jerk:
-            recovering = self._kernel(q, v, self.packed, self.dt, self._at_acceleration, lower, upper)
+            recovering = self._kernel(q, v, self._packed, self.dt, self._at_acceleration, lower, upper)
             return Bounds(lower, upper, recovering)
         if self._before is None:
             self._before = np.array(v)
-        recovering = self._kernel(q, v, self._before, self.packed, self.dt, self._at_acceleration, lower, upper)
+        recovering = self._kernel(q, v, self._before, self._packed, self.dt, self._at_acceleration, lower, upper)
         self._before[:] = v
         return Bounds(lower, upper, recovering)
+
+    @property
+    def packed(self) -> FloatArray:
+        """The limits as the kernels read them, (11, nv)."""
+        return self._packed
 
     def reset(self) -> None:
         """Forget the previous velocity: the acceleration before the next call counts as zero."""
