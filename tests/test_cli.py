@@ -18,7 +18,7 @@ from typer.testing import CliRunner, Result
 import cartctl as cc
 from cartctl.cli import files, hand, shapes
 from cartctl.cli.app import app
-from cartctl.cli.choices import PATHS, PLANES
+from cartctl.cli.choices import OBJECTIVES, PATHS, PLANES
 from cartctl.cli.console import number
 from cartctl.cli.probes import PACKAGES
 from cartctl.errors import ParameterError
@@ -177,6 +177,17 @@ def test_gain_is_the_rate_at_which_errors_decay(arm: str, plain: None) -> None:
         assert cartctl("track", arm, "--dt", "0.01", "--period", "1", "--gain", gain).exit_code == 0
         lags.append(cc.Run.load("out/three-circle-projected-gradient.npz").metrics().tasks[0].final_m)
     assert lags[1] < 1e-3 * lags[0]
+
+
+@pytest.mark.parametrize("name", [name for name in OBJECTIVES if name != "none"])
+def test_every_objective_by_name(arm: str, plain: None, name: str) -> None:
+    """It aims at what the hand does, its default gain is one the loop can take, and the header says it."""
+    result = cartctl("track", arm, *QUICK, "--objective", name)
+    assert result.exit_code == 0 and f"objective  {name}, gain " in result.stdout
+    run = cc.Run.load("out/three-circle-projected-gradient.npz")
+    assert run.meta["objective"].startswith(name.title().replace("-", "") + "(")
+    assert "axes=" not in run.meta["objective"] or "axes='xy'" in run.meta["objective"]
+    assert run.metrics().tasks[0].max_m < 1e-2
 
 
 @pytest.mark.parametrize(

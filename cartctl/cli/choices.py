@@ -9,7 +9,16 @@ from cartctl.errors import LookupFailure, ParameterError
 PATHS = ("circle", "line", "ellipse", "lissajous", "polygon")
 PLANES = ("xy", "xz", "yz", "yx", "zx", "zy")
 METRICS = ("identity", "inertia", "joint-limits", "inverse-inertia", "inverse-inertia-squared")
-OBJECTIVES = ("joint-range", "none")
+OBJECTIVES = (
+    "joint-range",
+    "posture",
+    "manipulability",
+    "smallest-singular-value",
+    "inverse-condition",
+    "kinetic-energy",
+    "gravity-torque",
+    "none",
+)
 
 
 class UnknownChoice(LookupFailure):

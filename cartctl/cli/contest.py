@@ -10,7 +10,8 @@ import numpy as np
 import cartctl as cc
 from cartctl.cli.console import progress, say
 from cartctl.cli.course import Course
-from cartctl.cli.method import in_words, make_solver, spends_redundancy
+from cartctl.cli.method import make_solver, spends_redundancy
+from cartctl.cli.purposes import aimed, in_words
 from cartctl.errors import ProblemError, UnsupportedProblem
 from cartctl.report import Comparison
 
@@ -22,7 +23,8 @@ class Contest:
     """
 
     def __init__(self, course: Course, dampings: Mapping[str, float | None], goal: cc.Objective | None) -> None:
-        self.course, self.goal, self.size = course, goal, len(dampings)
+        self.course, self.size = course, len(dampings)
+        self.goal = aimed(goal, course.hand.frame, course.axes)
         self.controllers: dict[str, cc.Controller] = {}
         self.refused: dict[str, str] = {}
         self.runs: dict[str, cc.Run] = {}

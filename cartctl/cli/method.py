@@ -8,9 +8,10 @@ from typing import Any, NamedTuple
 
 from cartctl import checks
 from cartctl.cli.choices import OBJECTIVES, choice
+from cartctl.cli.purposes import KNOWN, in_words
 from cartctl.errors import ParameterError, UnsupportedProblem
 from cartctl.levels import get_level
-from cartctl.objectives import JointRange, Objective
+from cartctl.objectives import Objective
 from cartctl.solvers import Solver, solver_class, solvers
 
 
@@ -64,7 +65,8 @@ def make_objective(name: str | None, gain: float | None) -> Objective | None:
         return None
     if gain is not None:
         checks.number("--objective-gain", gain, low=0.0, strict=True)
-    return JointRange() if gain is None else JointRange(gain=gain)
+    known = KNOWN[name or "joint-range"]
+    return known.make(known.gain if gain is None else gain)
 
 
 def make_purpose(solver: Solver, name: str | None, gain: float | None) -> Purpose:
@@ -78,11 +80,6 @@ def make_purpose(solver: Solver, name: str | None, gain: float | None) -> Purpos
         return Purpose(wanted, in_words(wanted))
     others = ", ".join(n for n in solvers() if spends_redundancy(solver_class(n)))
     return Purpose(None, "none" if able else f"none: {solver.name} has no null-space term ({others} have)")
-
-
-def in_words(objective: Objective) -> str:
-    """What the objective is for."""
-    return f"joint-range, gain {objective.gain:g}, keeps the joints near mid-range"
 
 
 def spends_redundancy(solver: Solver | type[Solver]) -> bool:

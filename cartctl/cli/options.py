@@ -113,13 +113,18 @@ ObjectiveName = Annotated[
     str | None,
     typer.Option(
         "--objective", metavar="NAME", rich_help_panel=_METHOD, autocompletion=words(OBJECTIVES),
-        help="What the redundancy is for: joint-range or none; by default joint-range where the solver can.",
+        help=f"What the redundancy is for: {', '.join(OBJECTIVES)}; by default joint-range where the solver can.",
     ),
 ]  # fmt: skip
 ObjectiveGain = Annotated[
     float | None,
-    typer.Option("--objective-gain", metavar="K", rich_help_panel=_METHOD, help="How strongly; by default 100."),
-]
+    typer.Option(
+        "--objective-gain",
+        metavar="K",
+        rich_help_panel=_METHOD,
+        help="How strongly; by default 100 for joint-range, 10 for manipulability, the header says it.",
+    ),
+]  # fmt: skip
 Step = Annotated[float, typer.Option("--dt", metavar="S", rich_help_panel=_METHOD, help="Time step in s.")]
 Duration = Annotated[
     float | None,

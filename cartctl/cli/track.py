@@ -50,6 +50,7 @@ def track(
     with busy(f"loading {robot}"):
         from cartctl.cli import files, method, scores
         from cartctl.cli.course import Course, Pace, Place, Way
+        from cartctl.cli.purposes import aimed
 
         how = method.make_solver(solver, damping)
         purpose = method.make_purpose(how, objective, objective_gain)
@@ -58,7 +59,7 @@ def track(
             Way(path, plane, size, period, laps),
             Pace(level, metric, gain, dt, duration),
         )
-        controller = course.controller(how, purpose.objective)
+        controller = course.controller(how, aimed(purpose.objective, course.hand.frame, course.axes))
         place = files.Files(out_dir, course.robot.name, path, how.name)
     console = out()
     idle = purpose.objective is not None and not course.spare

@@ -35,14 +35,14 @@ class Guard:
     """One policy for the tasks of one controller: see :mod:`cartctl.levels.singularity_policies`."""
 
     def __init__(self, singularity: Any, level: Level, robot: Robot, tasks: Sequence[Task]) -> None:
-        self._policy, self._tasks = as_policy(singularity), tasks
-        if isinstance(self._policy, SlowDown) and level.name != "velocity":
+        self.policy, self._tasks = as_policy(singularity), tasks
+        if isinstance(self.policy, SlowDown) and level.name != "velocity":
             raise UnsupportedProblem(
                 f"level {level.name!r} commands no velocities that could be slowed down near a singularity; use "
                 "singularity='damp', 'avoid' or 'halt', or level 'velocity'"
             )
-        self.waits = isinstance(self._policy, SlowDown | Halt)  # whether a path had better wait for the hand
-        self._acts = self._policy is not None and not isinstance(self._policy, Avoid)
+        self.waits = isinstance(self.policy, SlowDown | Halt)  # whether a path had better wait for the hand
+        self._acts = self.policy is not None and not isinstance(self.policy, Avoid)
         self._robot = robot
         self.reset()
 
@@ -52,9 +52,9 @@ class Guard:
 
     def objective(self, given: Objective | None) -> Objective | None:
         """The controller's objective with what the policy adds to it."""
-        if not isinstance(self._policy, Avoid):
+        if not isinstance(self.policy, Avoid):
             return given
-        away = TaskManipulability(self._tasks[0], self._policy.gain, self._robot)
+        away = TaskManipulability(self._tasks[0], self.policy.gain, self._robot)
         return away if given is None else given + away
 
     def guard(self, problem: Problem, state: State) -> Guarded:
@@ -67,8 +67,8 @@ class Guard:
             if not J.shape[0]:
                 continue
             U, s, _ = svd(np.asfortranarray(J))
-            if isinstance(self._policy, Halt):
-                self.halted |= bool(s[-1] < self._policy.threshold)
+            if isinstance(self.policy, Halt):
+                self.halted |= bool(s[-1] < self.policy.threshold)
                 continue
             e = equations[k]
             left = self._left(U, s, e.rhs, max(scale(J), task.size(state)))
@@ -83,9 +83,9 @@ class Guard:
 
     def _left(self, U: FloatArray, s: FloatArray, c: FloatArray, size: float) -> FloatArray | None:
         """What is left of a command c (m,); None where all of it is."""
-        if isinstance(self._policy, SlowDown):
-            left = self._policy.left(U, s, c)
+        if isinstance(self.policy, SlowDown):
+            left = self.policy.left(U, s, c)
             return None if norm(left) >= _ALL * norm(c) else left
-        assert isinstance(self._policy, InversePolicy)
-        taken = 1.0 - s * self._policy.factors(s, size)
+        assert isinstance(self.policy, InversePolicy)
+        taken = 1.0 - s * self.policy.factors(s, size)
         return None if (np.abs(taken) <= 1.0 - _ALL).all() else c - U @ (taken * (U.T @ c))

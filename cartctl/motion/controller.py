@@ -175,6 +175,11 @@ class Controller:
         return self.level.command(solution, references, state)
 
     @property
+    def singularity(self) -> Any:
+        """The policy in force near singularities, None where that is the solver's own business."""
+        return self._guard.policy
+
+    @property
     def halted(self) -> bool:
         """Whether ``singularity="halt"`` has stopped the robot; :meth:`reset` lets it go on."""
         return self._guard.halted

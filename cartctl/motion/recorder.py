@@ -131,6 +131,7 @@ def _meta(controller: Controller, interrupted: bool) -> dict[str, Any]:
         "solver_parameters": _parameters(solver),
         "level": controller.level.name,
         "objective": None if controller.objective is None else repr(controller.objective),
+        "singularity": None if controller.singularity is None else repr(controller.singularity),
         "metric": controller.metric if isinstance(controller.metric, str) else type(controller.metric).__name__,
         "dt": controller.dt,
         "cycles": period[0] if period else [],
