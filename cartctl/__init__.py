@@ -78,7 +78,7 @@ _HOMES = {
         "VelocityRatio",
         "WeightedSum",
     ),
-    "cartctl.levels": ("AccelerationLevel", "Avoid", "Command", "Halt", "SlowDown", "TorqueLevel"),
+    "cartctl.levels": ("AccelerationLevel", "AvoidSingularity", "Command", "Halt", "SlowDown", "TorqueLevel"),
     "cartctl.dynamics.friction": ("Friction",),
     "cartctl.model.payload": ("Payload",),
     "cartctl.model.wrench": ("Wrench",),
@@ -132,7 +132,7 @@ if TYPE_CHECKING:  # editors and mypy see what __getattr__ finds
     from cartctl.errors import CartctlWarning as CartctlWarning
     from cartctl.errors import RunInterrupted as RunInterrupted
     from cartctl.levels import AccelerationLevel as AccelerationLevel
-    from cartctl.levels import Avoid as Avoid
+    from cartctl.levels import AvoidSingularity as AvoidSingularity
     from cartctl.levels import Command as Command
     from cartctl.levels import Halt as Halt
     from cartctl.levels import SlowDown as SlowDown

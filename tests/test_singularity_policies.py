@@ -210,7 +210,7 @@ def test_avoid_climbs_the_manipulability_of_the_masked_task(solver: str, name: s
 def test_avoid_serves_every_task(task: cc.Task) -> None:
     """Its gradient against differences of sqrt(det(J J^T))."""
     robot = SIX["panda"]()
-    controller = cc.Controller(robot, task, "projected-gradient", limits=None, singularity=cc.Avoid(2.0))
+    controller = cc.Controller(robot, task, "projected-gradient", limits=None, singularity=cc.AvoidSingularity(2.0))
     q = robot.random_configuration(np.random.default_rng(3))
     state = robot.state(q)
     slope = cc.FunctionObjective(lambda s: np.sqrt(np.linalg.det(task.jacobian(s) @ task.jacobian(s).T)), gain=1.0)
@@ -225,13 +225,13 @@ def test_avoid_leads_away_from_a_singularity() -> None:
     robot = SIX["planar3R"]()
     q0 = folded(0.05)
     ends = {}
-    for singularity in (None, cc.Avoid(2.0)):
+    for singularity in (None, cc.AvoidSingularity(2.0)):
         tip = cc.FrameTask("tool", "xy", gain=5.0)
         controller = cc.Controller(robot, tip, "projected-gradient", limits=None, dt=5e-3, singularity=singularity)
         run = cc.simulate(controller, q0, duration=3.0)
         ends[singularity] = np.linalg.svd(tip.jacobian(robot.state(run.q[-1])))[1][-1]
         assert run.metrics().tasks[0].max_m < 0.02
-    assert ends[cc.Avoid(2.0)] > 5.0 * ends[None]
+    assert ends[cc.AvoidSingularity(2.0)] > 5.0 * ends[None]
 
 
 # ---------------------------------------------------------------- all of them
@@ -286,7 +286,7 @@ def test_misuse(singularity: object, error: type[Exception], words: str) -> None
         made("pinv", singularity)
 
 
-@pytest.mark.parametrize("kind", [cc.SlowDown, cc.Halt, cc.Avoid])
+@pytest.mark.parametrize("kind", [cc.SlowDown, cc.Halt, cc.AvoidSingularity])
 def test_parameters_are_checked(kind: type) -> None:
     with pytest.raises(ParameterError, match="is 0; expected a number above 0"):
         kind(0.0)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from cartctl.errors import LevelNotFound, ParameterError
 from cartctl.levels.acceleration import AccelerationLevel
 from cartctl.levels.base import Command, Level, Secondary
-from cartctl.levels.singularity_policies import Avoid, Halt, SlowDown
+from cartctl.levels.singularity_policies import AvoidSingularity, Halt, SlowDown
 from cartctl.levels.torque import TorqueLevel
 from cartctl.levels.velocity import VelocityLevel
 
@@ -17,7 +17,7 @@ _REGISTRY: dict[str, type[Level]] = {
 
 __all__ = [
     "AccelerationLevel",
-    "Avoid",
+    "AvoidSingularity",
     "Command",
     "Halt",
     "Level",

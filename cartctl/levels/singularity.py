@@ -13,7 +13,7 @@ from cartctl.algebra.svd import norm, scale, svd
 from cartctl.checks import FloatArray
 from cartctl.errors import UnsupportedProblem
 from cartctl.levels.base import Level
-from cartctl.levels.singularity_policies import Avoid, Halt, SlowDown, as_policy
+from cartctl.levels.singularity_policies import AvoidSingularity, Halt, SlowDown, as_policy
 from cartctl.levels.task_manipulability import TaskManipulability
 from cartctl.model.robot import Robot
 from cartctl.model.state import State
@@ -42,7 +42,7 @@ class Guard:
                 "singularity='damp', 'avoid' or 'halt', or level 'velocity'"
             )
         self.waits = isinstance(self.policy, SlowDown | Halt)  # whether a path had better wait for the hand
-        self._acts = self.policy is not None and not isinstance(self.policy, Avoid)
+        self._acts = self.policy is not None and not isinstance(self.policy, AvoidSingularity)
         self._robot = robot
         self.reset()
 
@@ -52,7 +52,7 @@ class Guard:
 
     def objective(self, given: Objective | None) -> Objective | None:
         """The controller's objective with what the policy adds to it."""
-        if not isinstance(self.policy, Avoid):
+        if not isinstance(self.policy, AvoidSingularity):
             return given
         away = TaskManipulability(self._tasks[0], self.policy.gain, self._robot)
         return away if given is None else given + away

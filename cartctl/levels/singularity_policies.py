@@ -6,7 +6,7 @@ Jacobian, ``J = U diag(sigma) V^T``, and its command c:
 
 - ``"truncate"``, ``"damp"``, or any linear inverse policy: ``c' = J J# c = U diag(sigma phi(sigma)) U^T c``, what the
   pseudo-inverse of that policy would deliver. A method that meets c' exactly then answers as that pseudo-inverse.
-- ``"slow-down"``: :class:`SlowDown`. ``"avoid"``: :class:`Avoid`. ``"halt"``: :class:`Halt`.
+- ``"slow-down"``: :class:`SlowDown`. ``"avoid"``: :class:`AvoidSingularity`. ``"halt"``: :class:`Halt`.
 """
 
 from __future__ import annotations
@@ -72,7 +72,7 @@ class Halt:
 
 
 @dataclass(frozen=True)
-class Avoid:
+class AvoidSingularity:
     """Spend the redundancy on the manipulability of the first task, beside the controller's own objective.
 
     ``u0 += k grad w / w_0``, ``w = sqrt(det(J J^T))`` (Yoshikawa 1985), J the masked task's, w_0 its median over random
@@ -86,13 +86,13 @@ class Avoid:
         object.__setattr__(self, "gain", checks.number("gain", self.gain, low=0.0, strict=True))
 
 
-Policy = SlowDown | Halt | Avoid | InversePolicy
+Policy = SlowDown | Halt | AvoidSingularity | InversePolicy
 
 NAMED: dict[str, Callable[[], Policy]] = {
     "truncate": lambda: Truncated(1e-2),
     "damp": lambda: NumericalFiltering(beta=0.0),
     "slow-down": SlowDown,
-    "avoid": Avoid,
+    "avoid": AvoidSingularity,
     "halt": Halt,
 }
 
@@ -108,7 +108,7 @@ def as_policy(singularity: Any) -> Policy | None:
                 "or solver='sdls'"
             )
         return singularity
-    if singularity is None or isinstance(singularity, SlowDown | Halt | Avoid):
+    if singularity is None or isinstance(singularity, SlowDown | Halt | AvoidSingularity):
         return singularity
     raise ParameterError(
         f"singularity is {singularity!r}; expected one of {', '.join(map(repr, NAMED))}, a policy such as "
