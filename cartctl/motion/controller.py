@@ -49,8 +49,8 @@ class Controller:
     back, under limits, so that the robot can stop at its target, at the edge of its reach and at the constraints.
     singularity: what becomes of a task near a singularity of its own Jacobian, whatever the solver: ``"truncate"``,
     ``"damp"``, ``"slow-down"``, ``"avoid"``, ``"halt"``, an inverse policy such as ``cc.Damped(0.05)``,
-    ``cc.SlowDown(0.1)``, ``cc.AvoidSingularity(2.0)``, ``cc.Halt(0.02)``, or None: the solver's own business. Where a command was
-    cut, the status is SINGULAR, and the solution's problem is what was left of it.
+    ``cc.SlowDown(0.1)``, ``cc.AvoidSingularity(2.0)``, ``cc.Halt(0.02)``, or None: the solver's own business. Where a
+    command was cut, the status is SINGULAR, and the solution's problem is what was left of it.
 
     Raises NoTasksError, ProblemError, TimeStepError, FrameNotFound, JointNotFound, SolverNotFound, LevelNotFound,
     UnsupportedProblem, MetricError, ParameterError, NonFiniteError.
