@@ -168,6 +168,18 @@ def test_at_and_near_singular_postures(kind: type[cc.Manipulability], distance: 
         assert objective.value(ahead) > objective.value(state)
 
 
+def test_with_two_directions_lost_there_is_no_slope_of_the_product() -> None:
+    """One lost direction leaves a slope, two do not: each cofactor has one of the two zeros as a factor."""
+    robot = cc.planar([1.0, 0.7, 0.4, 0.3])
+    state = robot.state(np.zeros(4))
+    w = cc.Manipulability(axes="x y rz")
+    assert analysis.rank(state.jacobian("tool")[[0, 1, 5]]) == 2
+    assert np.linalg.norm(w.gradient(state)) > 1e-3
+    flat = cc.Manipulability(axes="x z")  # z is never reached, x is lost where it is stretched
+    assert analysis.rank(state.jacobian("tool")[[0, 2]]) == 0
+    assert flat.value(state) == 0.0 and not flat.gradient(state).any()
+
+
 def test_a_folded_arm_leaves_the_singularity() -> None:
     """From rank lost exactly, inside the workspace, by the objective alone, with the hand where it was."""
     robot = cc.planar([1.0, 0.7, 0.4])

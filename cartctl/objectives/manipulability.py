@@ -17,7 +17,7 @@ class Manipulability(FrameMeasure):
     ``w = sqrt(det(A A^T)) = prod sigma_i`` with ``A = R J D``, proportional to the volume of the velocity ellipsoid
     (``sqrt(det(A^T A))`` where A has more rows than columns). ``dw/dq_i = w tr((A A^T)^-1 A dA_i^T)``, worked out as
     ``sum_k (prod_{l != k} sigma_l) u_k^T dA_i v_k``, in which nothing is divided by a singular value: at a singularity,
-    where w has a kink, it is finite and one of the directions in which w grows.
+    where w has a kink, it is finite and one of the directions in which w grows; zero where two directions are lost.
 
     frame: the robot's tool if None. axes: which rows, as in :class:`cartctl.FrameTask`, in world axes. length: m per
     rad, makes angular rows comparable with linear ones. scale: diag D (nv,), >= 0, the joint rates that count as 1;
