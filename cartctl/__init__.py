@@ -51,8 +51,10 @@ _HOMES = {
     "cartctl.model.limits": ("Limits",),
     "cartctl.model.loading": ("load", "planar"),
     "cartctl.model.robot": ("Robot",),
+    "cartctl.model.scene": ("Scene",),
     "cartctl.model.state": ("State",),
     "cartctl.tasks": (
+        "ClearanceTask",
         "ComTask",
         "FrameTask",
         "FunctionTask",
@@ -62,8 +64,8 @@ _HOMES = {
         "RelativeFrameTask",
         "Task",
     ),
-    "cartctl.constraints": ("Constraint", "FrameBox", "FrameSpeed", "HalfSpace"),
-    "cartctl.objectives": ("JointRange", "Objective"),
+    "cartctl.constraints": ("Avoid", "AvoidSelf", "Constraint", "FrameBox", "FrameSpeed", "HalfSpace"),
+    "cartctl.objectives": ("Clearance", "JointRange", "Objective", "SelfClearance"),
     "cartctl.levels": ("AccelerationLevel", "Command"),
     "cartctl.motion.controller": ("Controller",),
     "cartctl.motion.simulate": ("simulate",),
@@ -103,6 +105,8 @@ if TYPE_CHECKING:  # editors and mypy see what __getattr__ finds
     from cartctl.algebra.problem import Problem as Problem
     from cartctl.algebra.solution import Solution as Solution
     from cartctl.algebra.solution import Status as Status
+    from cartctl.constraints import Avoid as Avoid
+    from cartctl.constraints import AvoidSelf as AvoidSelf
     from cartctl.constraints import Constraint as Constraint
     from cartctl.constraints import FrameBox as FrameBox
     from cartctl.constraints import FrameSpeed as FrameSpeed
@@ -118,6 +122,7 @@ if TYPE_CHECKING:  # editors and mypy see what __getattr__ finds
     from cartctl.model.loading import load as load
     from cartctl.model.loading import planar as planar
     from cartctl.model.robot import Robot as Robot
+    from cartctl.model.scene import Scene as Scene
     from cartctl.model.state import State as State
     from cartctl.motion.controller import Controller as Controller
     from cartctl.motion.metrics import JointMetrics as JointMetrics
@@ -126,8 +131,10 @@ if TYPE_CHECKING:  # editors and mypy see what __getattr__ finds
     from cartctl.motion.run import Run as Run
     from cartctl.motion.run import TaskRecord as TaskRecord
     from cartctl.motion.simulate import simulate as simulate
+    from cartctl.objectives import Clearance as Clearance
     from cartctl.objectives import JointRange as JointRange
     from cartctl.objectives import Objective as Objective
+    from cartctl.objectives import SelfClearance as SelfClearance
     from cartctl.paths import Circle as Circle
     from cartctl.paths import Ellipse as Ellipse
     from cartctl.paths import Line as Line
@@ -162,6 +169,7 @@ if TYPE_CHECKING:  # editors and mypy see what __getattr__ finds
     from cartctl.solvers.task_priority import TaskPriority as TaskPriority
     from cartctl.solvers.task_scaling import TaskScaling as TaskScaling
     from cartctl.solvers.transpose import Transpose as Transpose
+    from cartctl.tasks import ClearanceTask as ClearanceTask
     from cartctl.tasks import ComTask as ComTask
     from cartctl.tasks import FrameTask as FrameTask
     from cartctl.tasks import FunctionTask as FunctionTask

@@ -102,7 +102,7 @@ class Approach:
         error = reference.error
         self._directions(J, b, rate, error, self._joints, low, high, self._dt, size, bounded, U, Vt, D)
         for i in np.flatnonzero(D[ASKED]):
-            self._scratch.set(state.q, Vt[i])
+            self._scratch.set(state.q, Vt[i], state.time)
             h = task.drift(self._scratch)
             D[BEND, i], D[PULL, i] = U[:, i] @ h, max(0.0, -float(error @ h))
         pace = 1.0
@@ -132,7 +132,7 @@ class Approach:
         rate, acceleration = reference.rate, reference.acceleration
         assert rate is not None and acceleration is not None
         solve = (Vt.T * (s / (s * s + (_CLEAR * size) ** 2))) @ U.T
-        self._scratch.set(state.q, solve @ rate)
+        self._scratch.set(state.q, solve @ rate, state.time)
         bend = np.abs(solve @ (acceleration - task.drift(self._scratch)))
         with np.errstate(divide="ignore"):
             room = float(np.min(self._joints[SLOWING] / bend))

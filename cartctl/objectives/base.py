@@ -35,7 +35,9 @@ class Objective(ABC):
         robot = state.robot
         columns = []
         for step in _STEP * np.eye(robot.nv):
-            ends = [self.gradient(robot.state(robot.integrate(state.q, s * step), state.v)) for s in (1.0, -1.0)]
+            ends = [
+                self.gradient(robot.state(robot.integrate(state.q, s * step), state.v, state.time)) for s in (1.0, -1.0)
+            ]
             columns.append((ends[0] - ends[1]) / (2.0 * _STEP))
         return np.array(columns).T  # type: ignore[no-any-return]
 

@@ -154,9 +154,7 @@ def _touches(w: WorkingSet, side: float, u: FloatArray, s: float, blur: float) -
 
 
 @part
-def _bring_in(
-    w: WorkingSet, q: Inequalities, code: int, u: FloatArray, s: float, blur: float, most: int
-) -> int:
+def _bring_in(w: WorkingSet, q: Inequalities, code: int, u: FloatArray, s: float, blur: float, most: int) -> int:
     """Make the violated inequality a member, dropping those in its way."""
     side = right_side(q, code)
     n = w.Q.shape[1]
