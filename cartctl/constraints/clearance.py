@@ -92,11 +92,9 @@ class ClearanceConstraint(Constraint):
         arrangement.update(state)
         ahead = arrangement.ahead(state, dt)
         haste = arrangement.haste(state, rates[[0, 2]], dt, ahead)
-        pairs = arrangement.indices.reshape(-1, 2)
-        quick, stray = haste[pairs].sum(axis=1).T
-        ahead_of = np.minimum(quick * (0.5 * quick / self.deceleration + 2.0 * dt), near + quick * dt)
-        reach = self.margin + ahead_of + 4.0 * np.minimum(stray, MOST_ERROR)
-        found = arrangement.measure(np.flatnonzero(arrangement.bounds() < reach))
+        found = arrangement.imminent(haste, self.margin, self.deceleration, dt, near, MOST_ERROR)
+        if not len(found.pairs):
+            return Rows(np.empty((0, nv)), np.empty(0), np.empty(0))
         settings = np.array([dt, self.deceleration, self.recovery_speed, self.margin, level, near])
         most = 64
         while True:
@@ -118,6 +116,7 @@ class ClearanceConstraint(Constraint):
                 C,
                 lower,
                 np.empty(nv),
+                np.empty((6, nv)),
                 np.empty((nv, nv)),
             )
             if count <= most:

@@ -44,7 +44,7 @@ def mean_speed(room: float, error: float, closing: float, settings: FloatArray) 
     """The largest mean closing speed of a step that begins at ``closing``."""
     dt = settings[0]
     end = approach_speed(room - 0.5 * dt * closing, error, 2.0, settings)
-    return 0.5 * (closing + max(end, closing - BRAKE * settings[1] * dt))
+    return float(0.5 * (closing + max(end, closing - BRAKE * settings[1] * dt)))
 
 
 @part
@@ -71,7 +71,7 @@ def highest(
 
 
 @part
-def add_point(
+def add_slope(
     world: FloatArray,
     table: FloatArray,
     points: FloatArray,
@@ -81,41 +81,60 @@ def add_point(
     sign: float,
     J: FloatArray,
     support: FloatArray,
-    order: FloatArray,
     row: FloatArray,
+    V: FloatArray,
+) -> None:
+    """Add ``sign n^T V`` of a point to row (nv,), its velocities V (3, nv) are kept."""
+    j = int(table[k, 0])
+    x = world[k, 9] + world[k, 0] * points[p, 0] + world[k, 1] * points[p, 1] + world[k, 2] * points[p, 2]
+    y = world[k, 10] + world[k, 3] * points[p, 0] + world[k, 4] * points[p, 1] + world[k, 5] * points[p, 2]
+    z = world[k, 11] + world[k, 6] * points[p, 0] + world[k, 7] * points[p, 1] + world[k, 8] * points[p, 2]
+    for i in range(J.shape[1]):
+        on = support[j, i]
+        V[0, i] = on * (J[0, i] + J[4, i] * z - J[5, i] * y)
+        V[1, i] = on * (J[1, i] + J[5, i] * x - J[3, i] * z)
+        V[2, i] = on * (J[2, i] + J[3, i] * y - J[4, i] * x)
+        row[i] += sign * (n[0] * V[0, i] + n[1] * V[1, i] + n[2] * V[2, i])
+
+
+@part
+def add_curvature(
+    joint: int,
+    n: FloatArray,
+    sign: float,
+    J: FloatArray,
+    support: FloatArray,
+    order: FloatArray,
+    V: FloatArray,
     H: FloatArray,
     rates: FloatArray,
     dt: float,
 ) -> float:
-    """Add ``sign n^T J`` of a point to row (nv,) and its curvature to H (nv, nv); a bound of what is third order."""
-    j, nv = int(table[k, 0]), J.shape[1]
-    at = [0.0, 0.0, 0.0]
-    for a in range(3):
-        at[a] = world[k, 9 + a]
-        for b in range(3):
-            at[a] += world[k, 3 * a + b] * points[p, b]
-    x, y, z = sign * n[0], sign * n[1], sign * n[2]
+    """Add a point's ``sign n . (omega_m x v_i)`` to H (nv, nv), m nearer to the root; a bound of third order, m."""
     turning, moving = 0.0, 0.0
-    for i in range(nv):
-        if support[j, i] == 0.0:
+    for i in range(J.shape[1]):
+        if support[joint, i] == 0.0:
             continue
-        o0, o1, o2 = J[3, i], J[4, i], J[5, i]
-        v0 = J[0, i] + o1 * at[2] - o2 * at[1]
-        v1 = J[1, i] + o2 * at[0] - o0 * at[2]
-        v2 = J[2, i] + o0 * at[1] - o1 * at[0]
-        row[i] += x * v0 + y * v1 + z * v2
         rate = abs(rates[0, i]) + rates[1, i]
-        turning += rate * sqrt(o0 * o0 + o1 * o1 + o2 * o2)
-        moving += rate * sqrt(v0 * v0 + v1 * v1 + v2 * v2)
-        for m in range(nv):  # n . (omega_m x v_i), m nearer to the root
-            if support[j, m] != 0.0 and order[m, i] != 0.0:
-                q0 = y * J[5, m] - z * J[4, m]
-                q1 = z * J[3, m] - x * J[5, m]
-                q2 = x * J[4, m] - y * J[3, m]
-                bend = order[m, i] * (q0 * v0 + q1 * v1 + q2 * v2)
-                H[m, i] += bend
+        turning += rate * sqrt(J[3, i] ** 2 + J[4, i] ** 2 + J[5, i] ** 2)
+        moving += rate * sqrt(V[0, i] ** 2 + V[1, i] ** 2 + V[2, i] ** 2)
+        q0 = sign * (n[1] * J[5, i] - n[2] * J[4, i])  # (n x omega) . v = n . (omega x v)
+        q1 = sign * (n[2] * J[3, i] - n[0] * J[5, i])
+        q2 = sign * (n[0] * J[4, i] - n[1] * J[3, i])
+        for m in range(J.shape[1]):
+            if order[i, m] != 0.0:
+                bend = order[i, m] * (q0 * V[0, m] + q1 * V[1, m] + q2 * V[2, m])
                 H[i, m] += bend
+                H[m, i] += bend
     return dt**3 / 6.0 * turning * turning * moving * exp(min(2.0 * turning * dt, 50.0))
+
+
+@part
+def wanted_rate(room: float, error: float, closing: float, settings: FloatArray) -> float:
+    """The least rate of the gap, m/s: of the next step, or its mean where the speed changes within."""
+    if settings[4] != 0.0:
+        return -mean_speed(room, error, closing, settings)
+    return -approach_speed(room, error, 1.0, settings)
 
 
 @part
@@ -132,7 +151,7 @@ def shortfall(H: FloatArray, radius: FloatArray) -> float:
 
 @kernel(
     "int(matrix, matrix, matrix, matrix, ints, ints, matrix, matrix, matrix, matrix, matrix, matrix, vector, "
-    "out_matrix, out_vector, out_vector, out_matrix)",
+    "out_matrix, out_vector, out_vector, out_matrix, out_matrix)",
     fast=True,
 )
 def clearance_rows(
@@ -152,6 +171,7 @@ def clearance_rows(
     C: FloatArray,
     lower: FloatArray,
     row: FloatArray,
+    V: FloatArray,
     H: FloatArray,
 ) -> int:
     """Fill ``C u >= lower``; how many rows there are, which may be more than C holds: call again with more.
@@ -170,38 +190,45 @@ def clearance_rows(
         coming = (highest(ahead, table, points, j, x, y, z, 1.0) - top) / dt if table[j, 0] == 0.0 else 0.0
         used = table[i, 4] + table[j, 4] + margin
         quick, stray = haste[i, 0] + haste[j, 0], min(haste[i, 1] + haste[j, 1], MOST_ERROR)
+        sway = haste[i, 2] + haste[j, 2]
+        bottom = -highest(world, table, points, i, x, y, z, -1.0)
         for a in range(int(table[i, 1]), int(table[i, 2])):
             at_a = height(world, points, i, a, x, y, z)
-            if far(at_a - top - used, quick, stray, settings):
+            if far(at_a - top - used, quick, stray, at_a == bottom, settings):
                 continue
             done = False
             for b in range(int(table[j, 1]), int(table[j, 2])):
                 at_b = height(world, points, j, b, x, y, z) if table[j, 0] != 0.0 else top
                 room = at_a - at_b - used
-                if done or far(room, quick, stray, settings):
+                if done or far(room, quick, stray, at_a == bottom and at_b == top, settings):
                     continue
                 done = table[j, 0] == 0.0  # what does not hang on the robot counts as a plane
                 row[:] = 0.0
-                H[:] = 0.0
-                error = add_point(world, table, points, i, a, n, 1.0, J, support, order, row, H, rates, dt)
+                add_slope(world, table, points, i, a, n, 1.0, J, support, row, V[:3])
                 if not done:
-                    error += add_point(world, table, points, j, b, n, -1.0, J, support, order, row, H, rates, dt)
+                    add_slope(world, table, points, j, b, n, -1.0, J, support, row, V[3:])
+                closing, least = coming, 0.0
+                for c in range(nv):
+                    closing -= row[c] * rates[3, c]
+                    least += row[c] * rates[0, c] - abs(row[c]) * rates[2, c]
+                if least - sway >= coming + wanted_rate(room, stray, closing, settings) + SKIP:
+                    continue  # no command can break it, whatever its curvature
+                H[:] = 0.0
+                error = add_curvature(int(table[i, 0]), n, 1.0, J, support, order, V[:3], H, rates, dt)
+                if not done:
+                    error += add_curvature(int(table[j, 0]), n, -1.0, J, support, order, V[3:], H, rates, dt)
                 error = min(error + 0.5 * dt * dt * shortfall(H, rates[1]), MOST_ERROR)
-                closing, offset, least, most, now = coming, 0.0, 0.0, 0.0, 0.0
+                offset, least, most, now = 0.0, 0.0, 0.0, 0.0
                 for c in range(nv):
                     bend = 0.0
                     for m in range(nv):
                         bend += H[c, m] * rates[0, m]
-                    closing -= row[c] * rates[3, c]
                     row[c] += dt * bend
                     offset += 0.5 * dt * bend * rates[0, c]
                     least += row[c] * rates[0, c] - abs(row[c]) * rates[2, c]
                     most += row[c] * rates[0, c] + abs(row[c]) * rates[2, c]
                     now += row[c] * rates[3, c]
-                if accelerating:
-                    wanted = offset + coming - mean_speed(room, error, closing, settings)
-                else:
-                    wanted = offset + coming - approach_speed(room, error, 1.0, settings)
+                wanted = offset + coming + wanted_rate(room, error, closing, settings)
                 if room < error:
                     wanted = min(wanted, most - SKIP)  # on the way back, no more than the joints can give
                 if least >= wanted + SKIP:
@@ -215,10 +242,13 @@ def clearance_rows(
 
 
 @part
-def far(room: float, quick: float, stray: float, settings: FloatArray) -> bool:
-    """Whether no command at all, at most ``quick``, is faster than what is allowed with ``room`` left."""
+def far(room: float, quick: float, stray: float, nearest: bool, settings: FloatArray) -> bool:
+    """Whether no command at all, at most ``quick``, is faster than what is allowed with ``room`` left.
+
+    Where joints can stop within a step, points behind the nearest ones need a row only when one step could take them in.
+    """
     dt = settings[0]
     left = room - 2.0 * stray - (0.5 * dt * quick if settings[4] != 0.0 else 0.0)
-    if left > settings[5] + quick * dt:
+    if left > quick * dt and settings[5] < inf and (not nearest or left > settings[5] + quick * dt):
         return True
     return left > 0.0 and braked(left, settings[1], dt) >= quick + stray / dt

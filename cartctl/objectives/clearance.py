@@ -1,9 +1,7 @@
 """Clearance: the smallest distance to obstacles, or of the robot's links from each other, smoothed over close pairs.
 
-``H = -tau log(exp(-rho/tau) + sum_i e(d_i))`` over the pairs with d_i < rho, where ``e(d) = exp(-d/tau) - exp(-rho/tau)
-(1 + (rho - d)/tau)`` is zero, with its slope, at rho: H is the smallest distance where one pair is near, less at most
-tau log(number of pairs) where several are, and rests at rho where none is. It is a distance, not its square, so that
-its gradient does not die away at contact; ``dH/dq = sum_i w_i n_i^T (J_p1 - J_p2)`` with weights w_i in [0, 1].
+H is a distance, not its square, so that its gradient does not die away at contact; how it is smoothed is in
+:mod:`cartctl.model.scene.smooth`. ``dH/dq = sum_i w_i n_i^T (J_p1 - J_p2)``, w_i >= 0.
 """
 
 from __future__ import annotations
@@ -17,7 +15,8 @@ from cartctl import checks
 from cartctl.checks import FloatArray
 from cartctl.errors import ParameterError
 from cartctl.model.robot import Robot
-from cartctl.model.scene import Arrangement, Scene, with_itself, with_scene
+from cartctl.model.scene import Arrangement, Contacts, Scene, with_itself, with_scene
+from cartctl.model.scene.smooth import smallest
 from cartctl.model.state import State
 from cartctl.objectives.base import Objective
 
@@ -27,8 +26,8 @@ _NEGLIGIBLE = 40.0  # tau: what is farther than the closest by this weighs 4e-18
 class SmoothClearance(Objective):
     """H in m, maximised; the classes below say between what.
 
-    gain: k > 0 in ``u0 = k grad H``, so (rad/s) per (m/rad): with 1, an arm whose nearest point moves 0.5 m/rad turns at
-    0.5 rad/s. smoothing: tau > 0, m, over which pairs count as equally close. within: rho, m, where it sets in; inf
+    gain: k > 0 in ``u0 = k grad H``, so (rad/s) per (m/rad): with 1, an arm whose nearest point moves 0.5 m/rad turns
+    at 0.5 rad/s. smoothing: tau > 0, m, over which pairs count as equally close. within: rho, m, where it sets in; inf
     counts every pair. Within one pair of shapes with corners the gradient jumps where the closest corner changes.
     """
 
@@ -48,22 +47,18 @@ class SmoothClearance(Objective):
         distance = self._near(state)[1]
         if not len(distance):
             return float(min(self.within, np.finfo(float).max))
-        least = float(distance.min())
-        near, far = self._terms(distance, least)
-        return least - self.smoothing * float(np.log(near.sum() + far))
+        return smallest(distance, self.smoothing, self.within).value
 
     def gradient(self, state: State) -> FloatArray:
         """``dH/dq`` (nv,), m/rad."""
         arrangement, distance, contacts = self._near(state)
         if not len(distance):
             return np.zeros(state.robot.nv)
-        near, far = self._terms(distance, float(distance.min()))
-        slopes = np.exp((distance.min() - distance) / self.smoothing) - far
-        weights = slopes / (near.sum() + far)
+        weights = smallest(distance, self.smoothing, self.within).weights
         gradient: FloatArray = weights @ arrangement.gradients(state, contacts)
         return gradient
 
-    def _near(self, state: State) -> tuple[Arrangement, FloatArray, Any]:
+    def _near(self, state: State) -> tuple[Arrangement, FloatArray, Contacts]:
         arrangement = self.arrangement(state.robot)
         reach = self.within
         if reach == np.inf:
@@ -72,21 +67,13 @@ class SmoothClearance(Objective):
         contacts = arrangement.within(state, reach)
         return arrangement, contacts.distance, contacts
 
-    def _terms(self, distance: FloatArray, least: float) -> tuple[FloatArray, float]:
-        """``e(d_i)`` (K,) and exp(-rho/tau), both times exp(least/tau)."""
-        scaled = np.exp((least - distance) / self.smoothing)
-        if self.within == np.inf:
-            return scaled, 0.0
-        far = float(np.exp((least - self.within) / self.smoothing))
-        return scaled - far * (1.0 + (self.within - distance) / self.smoothing), far
-
 
 class Clearance(SmoothClearance):
     """Distance of the robot's links, or of ``points``, to the obstacles of a scene (Khatib 1986), maximised.
 
-    points: names of frames, or a mapping of names to radii in m, to be watched instead of the links. gain, smoothing and
-    within as in :class:`cartctl.objectives.SmoothClearance`. Raises ParameterError, NonFiniteError; FrameNotFound at
-    the first state.
+    points: names of frames, or a mapping of names to radii in m, to be watched instead of the links. gain, smoothing
+    and within as in :class:`cartctl.objectives.SmoothClearance`. Raises ParameterError, NonFiniteError;
+    FrameNotFound at the first state.
     """
 
     def __init__(
@@ -96,7 +83,7 @@ class Clearance(SmoothClearance):
         *,
         points: Any = None,
         smoothing: float = 0.02,
-        within: float = 0.3,
+        within: float = 0.2,
     ) -> None:
         if not isinstance(scene, Scene):
             raise ParameterError(f"scene is a {type(scene).__name__}; expected a cc.Scene")

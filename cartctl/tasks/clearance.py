@@ -16,10 +16,12 @@ from cartctl import checks
 from cartctl.checks import FloatArray
 from cartctl.errors import ParameterError, TargetError
 from cartctl.model.robot import Robot
-from cartctl.model.scene import Arrangement, Scene, with_scene
+from cartctl.model.scene import Arrangement, Contacts, Scene, with_scene
+from cartctl.model.scene.smooth import smallest
 from cartctl.model.state import State
 from cartctl.tasks.base import Reference, Task
 
+_SMOOTH, _FADE = 0.2, 5.0  # tau in bands; how many tau beyond the band distances fade out
 _STEP = 1e-5  # rad or m along v, s at rest: the drift's difference; gradients are exact to 1e-9
 
 
@@ -35,7 +37,8 @@ class Nearest(NamedTuple):
 class ClearanceTask(Task):
     """Hold the smallest distance between the robot and a scene's obstacles at ``distance``, m, or more.
 
-    ``d_dot = n^T (J_p1 - J_p2) v`` of the closest pair. band: m > 0 beyond ``distance`` in which the task sets in. points:
+    ``d_dot = sum_i w_i n_i^T (J_p1 - J_p2) v``, smoothed over close pairs by a fifth of the band
+    (:mod:`cartctl.model.scene.smooth`). band: m > 0 beyond ``distance`` in which the task sets in. points:
     names of frames, or a mapping of names to radii, instead of the links. Where the null space of what ranks above
     cannot give the rate, it yields: for a guarantee use :class:`cartctl.Avoid`. gain (1/s), weight, fit, name as in
     :class:`cartctl.FrameTask`.
@@ -103,7 +106,8 @@ class ClearanceTask(Task):
         ends = []
         for sign in (1.0, -1.0):
             q = state.robot.integrate(state.q, sign * h * state.v)
-            ends.append(self._rate(state.robot.state(q, state.v, state.time + sign * h)))
+            found = self._measured(state.robot.state(q, state.v, state.time + sign * h))
+            ends.append(float(found.gradient @ state.v) + found.coming)
         return np.array([(ends[0] - ends[1]) / (2.0 * h)])
 
     def reference(self, state: State, t: float, anchor: Any) -> Reference:
@@ -115,42 +119,34 @@ class ClearanceTask(Task):
         rate = (1.0 - found.share) * own - found.share * found.coming
         return Reference(np.array([found.share * (self._distance - found.distance)]), np.array([rate]))
 
-    def _rate(self, state: State) -> float:
-        """``d_dot``, obstacles included, m/s."""
-        arrangement = self._arrangement(state.robot)
-        found = arrangement.closest(state)
-        return float(arrangement.gradients(state, found)[0] @ state.v) + self._coming(arrangement, state, found)
-
     def _nearest(self, state: State) -> Nearest:
         if self._last is not None and self._last[0] is state and self._last[1] == state.stamp:
             return self._last[2]
-        arrangement = self._arrangement(state.robot)
-        edge = self._distance + self.band
-        contacts = arrangement.within(state, edge)
-        if not len(contacts.pairs):
-            found = Nearest(edge, np.zeros(state.robot.nv), 0.0, 0.0)
-        else:
-            k = int(np.argmin(contacts.distance))
-            closest = type(contacts)(*(part[k : k + 1] for part in contacts))
-            x = min(max((edge - float(closest.distance[0])) / self.band, 0.0), 1.0)
-            found = Nearest(
-                float(closest.distance[0]),
-                arrangement.gradients(state, closest)[0],
-                self._coming(arrangement, state, closest),
-                x * x * (3.0 - 2.0 * x),
-            )
+        found = self._measured(state)
         self._last = (state, state.stamp, found)
         return found
 
+    def _measured(self, state: State) -> Nearest:
+        arrangement, tau = self._arrangement(state.robot), _SMOOTH * self.band
+        edge = self._distance + self.band
+        contacts = arrangement.within(state, edge + _FADE * tau)
+        if not len(contacts.pairs):
+            return Nearest(edge, np.zeros(state.robot.nv), 0.0, 0.0)
+        value, weights = smallest(contacts.distance, tau, edge + _FADE * tau)
+        coming = np.array([self._coming(arrangement, state, contacts, k) for k in range(len(weights))])
+        x = min(max((edge - value) / self.band, 0.0), 1.0)
+        gradient = weights @ arrangement.gradients(state, contacts)
+        return Nearest(value, gradient, float(weights @ coming), x * x * (3.0 - 2.0 * x))
+
     @staticmethod
-    def _coming(arrangement: Arrangement, state: State, contact: Any) -> float:
-        """The distance's rate from an obstacle on a path, m/s."""
-        obstacle = arrangement.parts[arrangement.pairs[int(contact.pairs[0])][1]].obstacle
+    def _coming(arrangement: Arrangement, state: State, contacts: Contacts, k: int) -> float:
+        """The rate of contact k's distance from an obstacle on a path, m/s."""
+        obstacle = arrangement.parts[arrangement.pairs[int(contacts.pairs[k])][1]].obstacle
         if obstacle is None or not obstacle.moves:
             return 0.0
-        here = obstacle.pose(state.time).actInv(contact.second[0])
+        here = obstacle.pose(state.time).actInv(contacts.second[k])
         ahead, behind = (obstacle.pose(state.time + h).act(here) for h in (_STEP, -_STEP))
-        return -float(contact.normal[0] @ (ahead - behind)) / (2.0 * _STEP)
+        return -float(contacts.normal[k] @ (ahead - behind)) / (2.0 * _STEP)
 
     def _arrangement(self, robot: Robot) -> Arrangement:
         known = self._known

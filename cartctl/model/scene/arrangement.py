@@ -58,6 +58,7 @@ class Arrangement:
             kernel.bounds.compiled,
             kernel.gradients.compiled,
         )
+        self._choose = kernel.choose.compiled
         self._at: tuple[State, int] | None = None
         self.world = np.empty((len(parts), 12))
 
@@ -83,8 +84,8 @@ class Arrangement:
         return world
 
     def haste(self, state: State, rates: FloatArray, dt: float, ahead: FloatArray) -> FloatArray:
-        """(N, 2): the largest speed of any point of each part, m/s, and how far one step bends its way, m."""
-        out = np.empty((len(self.parts), 2))
+        """(N, 3): the largest speed of any point of a part, m/s; how much one step bends its way, in m and m/s."""
+        out = np.empty((len(self.parts), 3))
         self._kernels[1](self.world, self.table, state.spatial_jacobian, self.support, rates, dt, out)
         for k in self._moving:
             R = ahead[k, :9].reshape(3, 3) @ self.world[k, :9].reshape(3, 3).T
@@ -93,6 +94,14 @@ class Arrangement:
             turn = float(np.linalg.norm(log3(R))) * self.parts[k].shape.reach
             out[k, 0] = (float(np.linalg.norm(shift)) + turn) / dt
         return out
+
+    def imminent(
+        self, haste: FloatArray, margin: float, deceleration: float, dt: float, near: float, error: float
+    ) -> Contacts:
+        """The pairs that could come into a margin if nothing slowed them, see :func:`kernel.choose`."""
+        chosen = np.empty(len(self.pairs), dtype=np.int64)
+        count = self._choose(self.world, self.table, self.indices, haste, margin, deceleration, dt, near, error, chosen)
+        return self.measure(chosen[:count])
 
     def bounds(self) -> FloatArray:
         """Lower bounds (P,) of all distances, m."""

@@ -41,9 +41,9 @@ def haste(
     dt: float,
     out: FloatArray,
 ) -> None:
-    """(N, 2): no point of a part is faster than out[:, 0], nor strays in a step from its tangent by over out[:, 1].
+    """(N, 3): no point of a part is faster than out[:, 0], m/s, nor are the rates of a step's bend above out[:, 2].
 
-    rates: (2, nv), the centre and the half-width of the joint rates.
+    out[:, 1] is what of that bend differs within the box of rates, m. rates: (2, nv), their centre and half-width.
     """
     for k in range(world.shape[0]):
         j = int(table[k, 0])
@@ -69,6 +69,7 @@ def haste(
         out[k, 0] = sqrt(v0 * v0 + v1 * v1 + v2 * v2) + sqrt(w0 * w0 + w1 * w1 + w2 * w2) * table[k, 5] + more
         rest = dt**3 / 6.0 * all_turning * all_turning * all_moving * exp(min(2.0 * all_turning * dt, 50.0))
         out[k, 1] = dt * dt * turning * more + rest
+        out[k, 2] = 2.0 * dt * all_turning * all_moving + rest / dt
 
 
 @part
@@ -141,3 +142,32 @@ def gradients(
             at_one = o0 * (b * z - c * y) + o1 * (c * x - a * z) + o2 * (a * y - b * x)
             at_two = o0 * (e * z - f * y) + o1 * (f * x - d * z) + o2 * (d * y - e * x)
             out[k, i] = support[one, i] * (linear + at_one) - support[two, i] * (linear + at_two)
+
+
+@kernel("int(matrix, matrix, ints, matrix, float, float, float, float, float, out_ints)", fast=True)
+def choose(
+    world: FloatArray,
+    table: FloatArray,
+    pairs: IntArray,
+    haste: FloatArray,
+    margin: float,
+    deceleration: float,
+    dt: float,
+    near: float,
+    most_error: float,
+    out: IntArray,
+) -> int:
+    """Fill ``out`` (P,) with the pairs that could come into the margin if they were not slowed; how many there are.
+
+    That is from ``margin + s^2/(2 a) + 2 s dt`` on at the closing speed s, or from ``near`` beyond the margin.
+    """
+    count = 0
+    for p in range(out.shape[0]):
+        i, j = pairs[2 * p], pairs[2 * p + 1]
+        s = haste[i, 0] + haste[j, 0]
+        stray = 4.0 * min(haste[i, 1] + haste[j, 1], most_error)
+        reach = margin + stray + min(s * (0.5 * s / deceleration + 2.0 * dt), near + s * dt)
+        if apart(world, table, i, j) < reach:
+            out[count] = p
+            count += 1
+    return count
