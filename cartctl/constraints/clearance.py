@@ -6,11 +6,12 @@ from abc import abstractmethod
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cartctl import checks
 from cartctl.checks import FloatArray
 from cartctl.constraints.base import Constraint, Rows
-from cartctl.constraints.clearance_kernel import MOST_ERROR, clearance_rows
+from cartctl.constraints.clearance_kernel import MOST_ERROR, REST, clearance_rows
 from cartctl.constraints.curvature import joint_order
 from cartctl.constraints.intervals import Box, spread
 from cartctl.errors import ParameterError
@@ -19,6 +20,7 @@ from cartctl.model.scene import Arrangement, Scene, excluded, with_itself, with_
 from cartctl.model.state import State
 
 _NEAR = 0.03  # m beyond the margin: where joints can stop within a step, what is farther need not be slowed yet
+_SLOW = 0.1  # rad/s or m/s: so slow, the curvature of a motion counts as an error
 _ANY_RATE = 10.0  # rad/s or m/s: a joint whose speed nothing limits, where it is asked what is near
 
 
@@ -75,16 +77,17 @@ class ClearanceConstraint(Constraint):
         """``n^T (J_a - J_b) v >= n . v_obstacle - y(d - margin)``, and what a step bends."""
         limits = state.robot.limits
         centre, radius = spread(box, limits.velocity_lower, limits.velocity_upper, state.v)
-        usable = _usable(box, radius, limits.velocity_lower, limits.velocity_upper, _ANY_RATE)
+        unknown = _unknown(box, limits.velocity_lower, limits.velocity_upper)
         abrupt = box is None or not np.isfinite([limits.acceleration_lower, limits.acceleration_upper]).all()
-        return self._rows(state, dt, np.array([centre, radius, usable, state.v]), 0.0, _NEAR if abrupt else np.inf)
+        rates = _around(centre, radius, unknown, state.v)
+        return self._rows(state, dt, rates, 0.0, _NEAR if abrupt else np.inf)
 
     def acceleration_rows(self, state: State, dt: float, box: Box | None = None) -> Rows:
         """The same for the mean rate of a step, ``w = v + a dt/2``, m/s^2."""
         limits, still = state.robot.limits, np.zeros(state.robot.nv)
         centre, radius = spread(box, limits.acceleration_lower, limits.acceleration_upper, still)
-        usable = _usable(box, radius, limits.acceleration_lower, limits.acceleration_upper, 2.0 * _ANY_RATE / dt)
-        rates = np.array([state.v + 0.5 * dt * centre, 0.5 * dt * radius, 0.5 * dt * usable, state.v])
+        unknown = _unknown(box, limits.acceleration_lower, limits.acceleration_upper)
+        rates = _around(state.v + 0.5 * dt * centre, 0.5 * dt * radius, unknown, state.v)
         return self._rows(state, dt, rates, 1.0, np.inf)
 
     def _rows(self, state: State, dt: float, rates: FloatArray, level: float, near: float) -> Rows:
@@ -92,10 +95,11 @@ class ClearanceConstraint(Constraint):
         arrangement.update(state)
         ahead = arrangement.ahead(state, dt)
         haste = arrangement.haste(state, rates[[0, 2]], dt, ahead)
-        found = arrangement.imminent(haste, self.margin, self.deceleration, dt, near, MOST_ERROR)
+        margin = self.margin + REST
+        found = arrangement.imminent(haste, margin, self.deceleration, dt, near, MOST_ERROR)
         if not len(found.pairs):
             return Rows(np.empty((0, nv)), np.empty(0), np.empty(0))
-        settings = np.array([dt, self.deceleration, self.recovery_speed, self.margin, level, near])
+        settings = np.array([dt, self.deceleration, self.recovery_speed, margin, level, near])
         most = 64
         while True:
             C, lower = np.empty((most, nv)), np.empty(most)
@@ -133,7 +137,8 @@ class Avoid(ClearanceConstraint):
     """Keep the robot's links ``margin`` away from the obstacles of a scene.
 
     A velocity damper (Faverjon & Tournassoud 1987) in a form that holds for whole steps. points: names of frames, or a
-    mapping of names to radii in m, to be watched instead of the links. margin, deceleration and recovery_speed as in :class:`cartctl.constraints.ClearanceConstraint`.
+    mapping of names to radii in m, to be watched instead of the links. margin, deceleration and recovery_speed as in
+    :class:`cartctl.constraints.ClearanceConstraint`.
 
     Raises ParameterError, NonFiniteError; FrameNotFound when it meets a robot.
     """
@@ -195,8 +200,19 @@ class AvoidSelf(ClearanceConstraint):
         return excluded(robot)
 
 
-def _usable(box: Box | None, radius: FloatArray, lower: FloatArray, upper: FloatArray, otherwise: float) -> FloatArray:
-    """The half-width of what a command may be: as known, ``otherwise`` where nothing is."""
+def _around(centre: FloatArray, radius: FloatArray, unknown: NDArray[np.bool_], v: FloatArray) -> FloatArray:
+    """(4, nv): where mean rates lie, as :func:`clearance_rows` reads it.
+
+    The centre is drawn towards zero by _SLOW, so that at rest a row is its tangent: curvature about a slow motion would
+    let a task that a row stops go on by picometres, paid for with motions of the null space at full speed, to and fro.
+    """
+    drawn = np.sign(centre) * np.maximum(np.abs(centre) - _SLOW, 0.0)
+    wide = radius + np.abs(centre - drawn)
+    return np.array([drawn, wide, np.where(unknown, _ANY_RATE, wide), v])
+
+
+def _unknown(box: Box | None, lower: FloatArray, upper: FloatArray) -> NDArray[np.bool_]:
+    """Whether nothing limits a joint, (nv,)."""
     low, high = (lower, upper) if box is None else (box.lower, box.upper)
-    known = (np.isfinite(low) & np.isfinite(high)) | (np.isfinite(lower) & np.isfinite(upper))
-    return np.where(known, radius, otherwise)
+    known: NDArray[np.bool_] = (np.isfinite(low) & np.isfinite(high)) | (np.isfinite(lower) & np.isfinite(upper))
+    return ~known

@@ -17,6 +17,7 @@ from cartctl.kernels import kernel, part
 
 MOST_ERROR = 0.025  # m: as for a frame's position
 BRAKE = 2.0  # times the deceleration planned with
+REST = 2e-5  # m held free beside the margin, in which one may rest: a way back of nanometres moves joints by degrees
 SKIP = 1e-9  # m/s: what round-off may be of a row that no command can break
 
 
@@ -36,7 +37,7 @@ def approach_speed(room: float, error: float, factor: float, settings: FloatArra
     free = room - 2.0 * error
     if free >= 0.0:
         return float(braked(free, deceleration, dt))
-    return float(min(max((room - error) * (factor / dt), -max(recovery, error / dt)), 0.0))
+    return float(min(max((room - error + REST) * (factor / dt), -max(recovery, error / dt)), 0.0))
 
 
 @part
@@ -229,7 +230,7 @@ def clearance_rows(
                     most += row[c] * rates[0, c] + abs(row[c]) * rates[2, c]
                     now += row[c] * rates[3, c]
                 wanted = offset + coming + wanted_rate(room, error, closing, settings)
-                if room < error:
+                if room < error - REST:
                     wanted = min(wanted, most - SKIP)  # on the way back, no more than the joints can give
                 if least >= wanted + SKIP:
                     continue
@@ -245,7 +246,7 @@ def clearance_rows(
 def far(room: float, quick: float, stray: float, nearest: bool, settings: FloatArray) -> bool:
     """Whether no command at all, at most ``quick``, is faster than what is allowed with ``room`` left.
 
-    Where joints can stop within a step, points behind the nearest ones need a row only when one step could take them in.
+    Where joints can stop within a step, points behind the nearest ones need a row only when one step takes them in.
     """
     dt = settings[0]
     left = room - 2.0 * stray - (0.5 * dt * quick if settings[4] != 0.0 else 0.0)

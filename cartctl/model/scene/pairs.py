@@ -1,7 +1,7 @@
 """Which parts can meet at all: with a scene, and among a robot's own links.
 
 Left out are pairs on one joint or on a joint and the next, what an SRDF disables, and pairs that no motion of the
-robot can part or that touch at home: neighbours whose shapes reach into each other.
+robot can part or that touch at home, by less than a centimetre: neighbours whose shapes reach into each other.
 """
 
 from __future__ import annotations
@@ -25,6 +25,7 @@ from cartctl.model.scene.bodies import Part, obstacle_parts, point_parts, robot_
 from cartctl.model.scene.scene import Scene
 
 _SAMPLES = 200  # postures in which a pair that always touches does
+_TOUCH = 0.01  # m: nearer than this counts as touching
 _known: WeakKeyDictionary[Robot, dict[tuple[str, str], str]] = WeakKeyDictionary()
 
 
@@ -116,7 +117,7 @@ def _apart(robot: Robot, a: int, b: int) -> bool:
 
 
 def _touching_at_home(robot: Robot, parts: Sequence[Part], pairs: list[tuple[int, int]]) -> set[tuple[int, int]]:
-    found = Arrangement(robot, parts, pairs).within(robot.state(robot.home), 0.0)
+    found = Arrangement(robot, parts, pairs).within(robot.state(robot.home), _TOUCH)
     return {pairs[k] for k in found.pairs.tolist()}
 
 
@@ -127,5 +128,5 @@ def _never_parted(robot: Robot, parts: Sequence[Part], pairs: list[tuple[int, in
     for _ in range(_SAMPLES):
         if not left:
             break
-        left &= set(arrangement.within(robot.state(robot.random_configuration(rng)), 0.0).pairs.tolist())
+        left &= set(arrangement.within(robot.state(robot.random_configuration(rng)), _TOUCH).pairs.tolist())
     return {_key(parts[pairs[k][0]].name, parts[pairs[k][1]].name): "always" for k in left}
