@@ -51,8 +51,10 @@ _HOMES = {
     "cartctl.model.limits": ("Limits",),
     "cartctl.model.loading": ("load", "planar"),
     "cartctl.model.robot": ("Robot",),
+    "cartctl.model.scene": ("Scene",),
     "cartctl.model.state": ("State",),
     "cartctl.tasks": (
+        "ClearanceTask",
         "ComTask",
         "FrameTask",
         "FunctionTask",
@@ -62,8 +64,9 @@ _HOMES = {
         "RelativeFrameTask",
         "Task",
     ),
-    "cartctl.constraints": ("Constraint", "FrameBox", "FrameSpeed", "HalfSpace"),
+    "cartctl.constraints": ("Avoid", "AvoidSelf", "Constraint", "FrameBox", "FrameSpeed", "HalfSpace"),
     "cartctl.objectives": (
+        "Clearance",
         "FunctionObjective",
         "GravityTorque",
         "InverseCondition",
@@ -72,6 +75,7 @@ _HOMES = {
         "Manipulability",
         "Objective",
         "Posture",
+        "SelfClearance",
         "SmallestSingularValue",
         "TorqueDistribution",
         "TorquePerForce",
@@ -123,6 +127,8 @@ if TYPE_CHECKING:  # editors and mypy see what __getattr__ finds
     from cartctl.algebra.problem import Problem as Problem
     from cartctl.algebra.solution import Solution as Solution
     from cartctl.algebra.solution import Status as Status
+    from cartctl.constraints import Avoid as Avoid
+    from cartctl.constraints import AvoidSelf as AvoidSelf
     from cartctl.constraints import Constraint as Constraint
     from cartctl.constraints import FrameBox as FrameBox
     from cartctl.constraints import FrameSpeed as FrameSpeed
@@ -144,6 +150,7 @@ if TYPE_CHECKING:  # editors and mypy see what __getattr__ finds
     from cartctl.model.loading import planar as planar
     from cartctl.model.payload import Payload as Payload
     from cartctl.model.robot import Robot as Robot
+    from cartctl.model.scene import Scene as Scene
     from cartctl.model.state import State as State
     from cartctl.model.wrench import Wrench as Wrench
     from cartctl.motion.controller import Controller as Controller
@@ -157,6 +164,7 @@ if TYPE_CHECKING:  # editors and mypy see what __getattr__ finds
     from cartctl.motion.run import Run as Run
     from cartctl.motion.run import TaskRecord as TaskRecord
     from cartctl.motion.simulate import simulate as simulate
+    from cartctl.objectives import Clearance as Clearance
     from cartctl.objectives import FunctionObjective as FunctionObjective
     from cartctl.objectives import GravityTorque as GravityTorque
     from cartctl.objectives import InverseCondition as InverseCondition
@@ -165,6 +173,7 @@ if TYPE_CHECKING:  # editors and mypy see what __getattr__ finds
     from cartctl.objectives import Manipulability as Manipulability
     from cartctl.objectives import Objective as Objective
     from cartctl.objectives import Posture as Posture
+    from cartctl.objectives import SelfClearance as SelfClearance
     from cartctl.objectives import SmallestSingularValue as SmallestSingularValue
     from cartctl.objectives import TorqueDistribution as TorqueDistribution
     from cartctl.objectives import TorquePerForce as TorquePerForce
@@ -204,6 +213,7 @@ if TYPE_CHECKING:  # editors and mypy see what __getattr__ finds
     from cartctl.solvers.task_priority import TaskPriority as TaskPriority
     from cartctl.solvers.task_scaling import TaskScaling as TaskScaling
     from cartctl.solvers.transpose import Transpose as Transpose
+    from cartctl.tasks import ClearanceTask as ClearanceTask
     from cartctl.tasks import ComTask as ComTask
     from cartctl.tasks import FrameTask as FrameTask
     from cartctl.tasks import FunctionTask as FunctionTask

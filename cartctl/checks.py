@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from cartctl.errors import NonFiniteError, ParameterError, ShapeError, TimeStepError
 
 FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
 
 LARGEST = 1e9  # of a configuration or rate: beyond it, forward kinematics has no digit left
 

@@ -146,7 +146,7 @@ class Approach:
         bounded = self._walls.lower.shape[0] > 0
         self._directions(J, b, y, rate, error, self._joints, *self._walls, self._dt, size, bounded, U, Vt, D)
         for i in np.flatnonzero(D[ASKED]):
-            self._scratch.set(state.q, Vt[i])
+            self._scratch.set(state.q, Vt[i], state.time)
             h = task.drift(self._scratch)
             D[BEND, i], D[PULL, i] = U[:, i] @ h, max(0.0, -float(error @ h))
         return Directions(U, Vt, D, size)
@@ -160,7 +160,7 @@ class Approach:
         assert rate is not None and acceleration is not None
         s = found.D[SIGMA]
         solve = (found.Vt.T * (s / (s * s + (_CLEAR * found.size) ** 2))) @ found.U.T
-        self._scratch.set(state.q, solve @ rate)
+        self._scratch.set(state.q, solve @ rate, state.time)
         bend = np.abs(solve @ (acceleration - task.drift(self._scratch)))
         with np.errstate(divide="ignore"):
             room = float(np.min(self._joints[SLOWING] / bend))

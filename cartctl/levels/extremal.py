@@ -48,7 +48,7 @@ def _pullback_derivative(state: State, tasks: Sequence[Task], multipliers: Float
     for step in _STEP * np.eye(robot.nv):
         ends = []
         for sign in (1.0, -1.0):
-            scratch.set(robot.integrate(state.q, sign * step), state.v)
+            scratch.set(robot.integrate(state.q, sign * step), state.v, state.time)
             ends.append(np.concatenate([task.jacobian(scratch) for task in tasks]).T @ multipliers)
         columns.append((ends[0] - ends[1]) / (2.0 * _STEP))
     return np.array(columns).T  # type: ignore[no-any-return]

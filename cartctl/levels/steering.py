@@ -64,7 +64,7 @@ class Steering(Approach):
     ) -> None:
         """Begin a step at ``state`` under a box and rows on the acceleration."""
         dt, v = self._dt, state.v
-        self._at.set(state.robot.integrate(state.q, 0.5 * dt * v), v)
+        self._at.set(state.robot.integrate(state.q, 0.5 * dt * v), v, state.time)
         if rows is not None:
             C, c_lower, c_upper = rows
             begun = C @ v

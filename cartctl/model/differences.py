@@ -22,7 +22,7 @@ def central(state: State, function: Callable[[State], Any], step: float = STEP) 
     for shift in step * np.eye(robot.nv):
         ends = []
         for signed in (shift, -shift):
-            scratch.set(robot.integrate(state.q, signed), state.v)
+            scratch.set(robot.integrate(state.q, signed), state.v, state.time)
             ends.append(np.array(function(scratch)))
         columns.append((ends[0] - ends[1]) / (2.0 * step))
     return np.stack(columns, axis=-1)

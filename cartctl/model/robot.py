@@ -110,8 +110,8 @@ class Robot:
         self.dof(joint)
         return "JointModelP" in self._joints[joint].shortname()
 
-    def state(self, q: Any, v: Any = None) -> State:
-        """The robot at q (nq,) and v (nv,), zeros if None.
+    def state(self, q: Any, v: Any = None, time: float = 0.0) -> State:
+        """The robot at q (nq,) and v (nv,), zeros if None; time in s, for obstacles that move.
 
         Raises ShapeError, NonFiniteError, ConfigurationError.
         """
@@ -119,6 +119,7 @@ class Robot:
         state.set(
             self.check_configuration(q),
             self._rest if v is None else checks.vector("v", v, self.nv, largest=checks.LARGEST),
+            checks.number("time", time),
         )
         return state
 

@@ -27,7 +27,8 @@ class State:
     """A robot at configuration q (nq,) and velocity v (nv,), with its own Pinocchio data.
 
     Frame quantities are in LOCAL_WORLD_ALIGNED axes (origin at the frame, axes of the world), linear part first.
-    Arrays handed out are read-only and stay valid for good. Made by :meth:`cartctl.Robot.state`, which checks q and v;
+    Arrays handed out are read-only and stay valid for good. time: s, when the robot is there, for what moves by itself
+    (the obstacles of a scene). Made by :meth:`cartctl.Robot.state`, which checks q and v;
     raises FrameNotFound for an unknown frame.
     """
 
@@ -36,12 +37,15 @@ class State:
         "_cache",
         "_data",
         "_frames",
+        "_joints",
         "_kinematics",
         "_model",
+        "_poses",
         "_rest",
         "q",
         "robot",
         "stamp",
+        "time",
         "v",
     )
 
@@ -50,14 +54,16 @@ class State:
         self._model = robot.model
         self._data = robot.model.createData()
         self._frames: dict[str, FrameView] = {}
+        self._joints: list[tuple[FloatArray, FloatArray]] = []
         self.stamp = 0
         self._rest = np.zeros(robot.nv)
         self.set(robot.neutral, np.zeros(robot.nv))
 
-    def set(self, q: FloatArray, v: FloatArray) -> None:
+    def set(self, q: FloatArray, v: FloatArray, time: float = 0.0) -> None:
         """Move to (q, v), already checked, and forget all that was computed; for loops that own their state."""
         self.q = q
         self.v = v
+        self.time = time
         self.stamp += 1
         self._kinematics = False
         self._accelerated = False
@@ -69,12 +75,40 @@ class State:
         if view is None:
             view = self._frames[frame] = FrameView(self._data, self.robot.frame_id(frame))
         if view.placed != self.stamp:
-            if not self._kinematics:
-                _joint_jacobians(self._model, self._data, self.q)
-                self._kinematics = True
+            self._move()
             _place_frame(self._model, self._data, view.fid)
             view.placed = self.stamp
         return view
+
+    def _move(self) -> None:
+        if not self._kinematics:
+            _joint_jacobians(self._model, self._data, self.q)
+            self._kinematics = True
+
+    @property
+    def joint_poses(self) -> FloatArray:
+        """The pose of every joint in the world, (njoints, 12): its rotation row by row, then its origin, m."""
+        if "joints" not in self._cache:
+            self._move()
+            if not self._joints:
+                self._poses = np.empty((self._model.njoints, 12))
+                for row, pose in zip(self._poses, self._data.oMi, strict=True):
+                    self._joints += [(row[:9].reshape(3, 3), pose.rotation), (row[9:], pose.translation)]
+            for copy, view in self._joints:
+                copy[:] = view
+            self._cache["joints"] = _frozen(self._poses)
+        return self._cache["joints"]
+
+    @property
+    def spatial_jacobian(self) -> FloatArray:
+        """(6, nv): column i is the twist of coordinate i's joint at the world's origin; what hangs on it moves so."""
+        self._move()
+        return self._once("J", lambda: self._data.J.reshape(6, -1))
+
+    def place_shapes(self, shapes: pin.GeometryModel, data: pin.GeometryData) -> None:
+        """Put shapes attached to the joints where they are, in ``data``."""
+        self._move()
+        pin.updateGeometryPlacements(self._model, self._data, shapes, data)
 
     def placement(self, frame: str) -> pin.SE3:
         """The pose of ``frame`` in the world."""

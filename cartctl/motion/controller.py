@@ -239,7 +239,7 @@ class Controller:
             v = checks.vector("v", v, robot.nv, largest=LARGEST)
         if not (type(t) is float and math.isfinite(t)):
             checks.number("t", t)
-        self._state.set(q, v)
+        self._state.set(q, v, t)
         return self._state
 
     @property

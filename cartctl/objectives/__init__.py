@@ -1,6 +1,7 @@
 """What to spend the redundancy on: H(q) and its gradient, one a file."""
 
 from cartctl.objectives.base import Objective
+from cartctl.objectives.clearance import Clearance, SelfClearance, SmoothClearance
 from cartctl.objectives.function import FunctionObjective
 from cartctl.objectives.gravity_torque import GravityTorque
 from cartctl.objectives.inverse_condition import InverseCondition
@@ -15,6 +16,7 @@ from cartctl.objectives.velocity_ratio import VelocityRatio
 from cartctl.objectives.weighted_sum import WeightedSum
 
 __all__ = [
+    "Clearance",
     "FunctionObjective",
     "GravityTorque",
     "InverseCondition",
@@ -23,7 +25,9 @@ __all__ = [
     "Manipulability",
     "Objective",
     "Posture",
+    "SelfClearance",
     "SmallestSingularValue",
+    "SmoothClearance",
     "TorqueDistribution",
     "TorquePerForce",
     "VelocityRatio",

@@ -120,4 +120,4 @@ class FunctionTask(Task):
 
     @staticmethod
     def _moved(state: State, displacement: FloatArray) -> State:
-        return state.robot.state(state.robot.integrate(state.q, displacement), state.v)
+        return state.robot.state(state.robot.integrate(state.q, displacement), state.v, state.time)
