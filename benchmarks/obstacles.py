@@ -134,7 +134,12 @@ def line_between_posts(seconds: float, solver: str, level: str, dt: float) -> di
     avoid = cc.Avoid(scene, 0.01)
     what = cc.AccelerationLevel(damping=3.0) if level == "acceleration" else level
     controller = cc.Controller(
-        robot, [hand, cc.PostureTask(gain=1.0)], solver, level=what, dt=dt, constraints=[avoid, cc.AvoidSelf(0.005)]
+        robot,
+        [hand, cc.PostureTask(gain=1.0, weight=1e-3)],
+        solver,
+        level=what,
+        dt=dt,
+        constraints=[avoid, cc.AvoidSelf(0.005)],
     )
     began = time.perf_counter()
     run = cc.simulate(controller, robot.home, duration=seconds)

@@ -116,7 +116,8 @@ def test_an_adversary_at_full_speed_never_enters_the_margin(
     build, make, q = CASES[name]
     robot, constraint = build(), make()
     drive = towards(constraint, np.random.default_rng(1), noise)
-    found = fight(constraint, robot, drive, level, most, robot.home if q is None else q)
+    steps = 60 if "itself" in name and most is None else 150  # hundreds of rows each, for an LP
+    found = fight(constraint, robot, drive, level, most, robot.home if q is None else q, steps)
     assert found.rows > 0
     # of 150 steps; where braking in several rows, at 2 m/s^2 and against centripetal terms, asks for over 20 rad/s^2
     assert found.infeasible <= (25 if name == "planar" and level == "velocity" and most else 1)
@@ -200,7 +201,7 @@ def test_a_velocity_row_is_the_rate_of_its_points() -> None:
         c = np.sign(c) * np.maximum(np.abs(c) - 0.1, 0.0)
         after = robot.state(robot.integrate(state.q, c * dt)).position(robot.tool)
         mean = n @ (after - at - velocity * dt) / dt - 0.03 / dt
-        narrow = constraint.velocity_rows(state, dt, Box(c - 30.0, c + 30.0))
+        narrow = constraint.velocity_rows(state, dt, Box(state.v - 30.0, state.v + 30.0))
         np.testing.assert_allclose(rows.C, narrow.C, atol=1e-12)  # about the same middle
         free = 0.025 - REST - 2.0 * error_of(state, robot, n, dt)
         allowed = allowed_speed(np.array([free]), constraint.deceleration, dt)[0]
