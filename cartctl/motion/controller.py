@@ -35,13 +35,14 @@ from cartctl.tasks.base import Task
 class Controller:
     """A robot with tasks, highest priority first, resolved by one solver at one level.
 
-    tasks: one Task or more. solver: a name from :func:`cartctl.solvers`, or an instance. level: ``"velocity"`` or
-    ``"acceleration"``. limits: Limits, None (off), or by default the robot's own where the solver honours bounds, else
-    off with one warning; ``controller.limits`` may be assigned while running.
+    tasks: one Task or more. solver: a name from :func:`cartctl.solvers`, or an instance. level: ``"velocity"``,
+    ``"acceleration"`` or ``"torque"``. limits: Limits, None (off), or by default the robot's own where the solver
+    honours bounds, else off with one warning; ``controller.limits`` may be assigned while running.
     objective: an Objective for the null space. metric: None or ``"identity"``, ``"inertia"`` (least kinetic energy),
-    ``"joint-limits"`` (Chan & Dubey), an (nv,) or (nv, nv) array, or a function of the State that returns one. dt: s,
-    the step it is called with; a gain that cannot be stable at it is a CartctlWarning. soft_start: s over which the
-    objective rises to its full share, so that the null space does not start with a jump.
+    ``"joint-limits"`` (Chan & Dubey), of torques ``"inverse-inertia"`` or ``"inverse-inertia-squared"``, an (nv,) or
+    (nv, nv) array, or a function of the State that returns one. dt: s, the step it is called with; a gain that cannot
+    be stable at it is a CartctlWarning. soft_start: s over which the objective rises to its full share, so that the
+    null space does not start with a jump.
 
     constraints: Constraints such as ``cc.FrameBox(...)``. disabled: names of joints that brake and stand still. jerk:
     whether ``limits.jerk_*`` are kept, too. path_clock: whether a path waits for a hand that is slowed down, so that it
@@ -53,7 +54,7 @@ class Controller:
     command was cut, the status is SINGULAR, and the solution's problem is what was left of it.
 
     Raises NoTasksError, ProblemError, TimeStepError, FrameNotFound, JointNotFound, SolverNotFound, LevelNotFound,
-    UnsupportedProblem, MetricError, ParameterError, NonFiniteError.
+    UnsupportedProblem, UnderactuatedRobot, MetricError, ParameterError, NonFiniteError.
     """
 
     def __init__(
