@@ -7,10 +7,10 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
-from cartctl.constraints.braking import allowed_speed
 from scipy.optimize import linprog
 
 import cartctl as cc
+from cartctl.braking import allowed_speed
 from cartctl.constraints import Box, ClearanceConstraint, Rows
 from cartctl.constraints.clearance_kernel import REST
 from cartctl.constraints.curvature import curvatures, joint_order, largest_form, third_order

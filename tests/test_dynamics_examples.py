@@ -13,7 +13,7 @@ import pytest
 import cartctl as cc
 from cartctl import dynamics as dyn
 from cartctl.dynamics.dh_model import pinocchio_model
-from tests.test_worked_examples import compare, real
+from tests.worked_examples import compare, real
 
 DATA = Path(__file__).parent / "data/dynamics_examples.json"
 ITEMS = {item["id"]: item for item in json.loads(DATA.read_text())}

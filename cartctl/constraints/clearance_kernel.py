@@ -23,7 +23,7 @@ SKIP = 1e-9  # m/s: what round-off may be of a row that no command can break
 
 @part
 def braked(distance: float, deceleration: float, dt: float) -> float:
-    """The largest speed from which one stops within ``distance`` (:mod:`cartctl.constraints.braking`)."""
+    """The largest speed from which one stops within ``distance`` (:mod:`cartctl.braking`)."""
     step = deceleration * dt
     X = max(distance, 0.0) / (step * dt)
     k = floor(0.5 * (sqrt(1.0 + 8.0 * X) - 1.0))

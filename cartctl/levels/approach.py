@@ -98,6 +98,7 @@ class Approach:
             Above(ranked=not solver.stacks),
             Walls(_NOTHING, _NOTHING, np.zeros((0, 0)), _NOTHING, _NOTHING),
         )
+        self._open = self._walls
         self._directions, self._hold = directions.compiled, hold.compiled
 
     def begin(
@@ -112,6 +113,7 @@ class Approach:
         C, c_lower, c_upper = (np.zeros((0, state.v.shape[0])), _NOTHING, _NOTHING) if rows is None else rows
         low, high = (_NOTHING, _NOTHING) if lower is None or upper is None else (lower, upper)
         self._walls = Walls(low, high, C, c_lower, c_upper)
+        self._open = self._walls if rows is None else Walls(low, high, C[:0], c_lower[:0], c_upper[:0])
 
     def command(self, task: Task, state: State, J: FloatArray, reference: Reference, b: FloatArray) -> Approached:
         """``b`` (m,) held back along directions in which the robot could not stop in time."""
@@ -143,8 +145,9 @@ class Approach:
         k = min(m, n)
         U, Vt, D = np.empty((m, k)), np.empty((k, n)), np.empty((ROWS, k))
         rate, error = _NOTHING if reference.rate is None else reference.rate, reference.error
-        bounded = self._walls.lower.shape[0] > 0
-        self._directions(J, b, y, rate, error, self._joints, *self._walls, self._dt, size, bounded, U, Vt, D)
+        walls = self._walls if reference.rate is None else self._open  # one stops before a wall, and slides along it
+        bounded = walls.lower.shape[0] > 0
+        self._directions(J, b, y, rate, error, self._joints, *walls, self._dt, size, bounded, U, Vt, D)
         for i in np.flatnonzero(D[ASKED]):
             self._scratch.set(state.q, Vt[i], state.time)
             h = task.drift(self._scratch)
