@@ -82,7 +82,7 @@ def test_nearly_singular_levels_have_their_certificates(soaking, problem):
     assert not batch.run(*problem, 1).failures, NEARLY_SINGULAR[problem]
 
 
-@pytest.mark.xfail(strict=True, reason="open: some fifteen in a million of these problems have no certificate")
+@pytest.mark.xfail(strict=True, reason="open: some twenty in a million of these problems have no certificate")
 @pytest.mark.parametrize("problem", OPEN, ids=str)
 def test_those_without(soaking, problem):
     batch, _, _ = soaking
