@@ -17,6 +17,7 @@ from cartctl.errors import NonFiniteError, ParameterError, ShapeError, TimeStepE
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
+PER_SECOND = "numbers of at least 0, in 1/s"  # what gains are
 LARGEST = 1e9  # of a configuration or rate: beyond it, forward kinematics has no digit left
 
 
@@ -107,6 +108,22 @@ def number(name: str, value: Any, *, low: float = -math.inf, high: float = math.
     if x < low or x > high or (strict and x == low):
         raise ParameterError(f"{name} is {x:g}; expected a number {_interval(low, high, strict)}")
     return x
+
+
+def amounts(name: str, value: Any, wanted: str = "numbers of at least 0") -> float | FloatArray:
+    """``value`` as a number >= 0, or a vector of them; raises ParameterError, ShapeError, NonFiniteError."""
+    if np.ndim(value) == 0:
+        return number(name, value, low=0.0)
+    array = vector(name, value)
+    if (array < 0.0).any():
+        raise ParameterError(f"{name} is {array}; expected {wanted}")
+    return array
+
+
+def fits(label: str, value: float | FloatArray, n: int) -> None:
+    """Refuse a vector that is not (n,), where a number would do; raises ShapeError."""
+    if isinstance(value, np.ndarray) and value.shape != (n,):
+        raise ShapeError(f"{label} has shape {value.shape}; expected a number or ({n},)")
 
 
 def duration(name: str, value: Any) -> float:

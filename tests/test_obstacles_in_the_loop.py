@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import coal
 import numpy as np
 import pinocchio as pin
@@ -119,17 +121,9 @@ def test_a_ball_that_comes_into_the_arm_pushes_the_elbow_not_the_hand(level: str
     assert trembles(run.v, 1e-3) == 0
 
 
-@pytest.mark.parametrize(
-    "level",
-    [
-        "velocity",
-        pytest.param(
-            "acceleration", marks=pytest.mark.xfail(reason="open: before a wall a whole pose goes on moving, 0.1 rad/s")
-        ),
-    ],
-)
-def test_a_hand_pressed_against_a_wall_rests_without_trembling(level: str) -> None:
-    """A target behind a wall: the hand stops at the margin and stays, to the last digit that matters."""
+@lru_cache
+def pressed(level: str) -> tuple[cc.Run, np.ndarray]:
+    """A target behind a wall, and the distance from the wall in every step, m."""
     robot = panda()
     start = robot.state(robot.home).position(robot.tool)
     wall = cc.Scene().box("wall", [0.1, 2.0, 2.0], at=start + [0.3, 0.0, 0.0])
@@ -140,11 +134,32 @@ def test_a_hand_pressed_against_a_wall_rests_without_trembling(level: str) -> No
     run = cc.simulate(
         cc.Controller(robot, hand, "sns", level=level, dt=DT, constraints=[avoid]), robot.home, duration=4.0
     )
-    distance = np.array([avoid.margin - avoid.excess(robot.state(q)) for q in run.q])
+    return run, np.array([avoid.margin - avoid.excess(robot.state(q)) for q in run.q])
+
+
+@pytest.mark.parametrize("level", ["velocity", "acceleration"])
+def test_a_hand_pressed_against_a_wall_stays_at_the_margin(level: str) -> None:
+    distance = pressed(level)[1]
     assert distance.min() >= 0.02 - 1e-5
     assert distance[-1] < 0.021
-    assert np.abs(run.v[-200:]).max() < 1e-3
-    assert trembles(run.v, 1e-4) <= (2 if level == "velocity" else 10)  # it comes to rest in a few swings
+
+
+@pytest.mark.parametrize(
+    "level, swings",
+    [
+        ("velocity", 2),
+        pytest.param(
+            "acceleration",
+            10,
+            marks=pytest.mark.xfail(strict=True, reason="open: before a wall a whole pose goes on moving, 0.1 rad/s"),
+        ),
+    ],
+)
+def test_a_hand_pressed_against_a_wall_rests_without_trembling(level: str, swings: int) -> None:
+    """To the last digit that matters, in a few swings."""
+    v = pressed(level)[0].v
+    assert np.abs(v[-200:]).max() < 1e-3
+    assert trembles(v, 1e-4) <= swings
 
 
 def test_rows_yield_before_the_joints_and_say_so() -> None:

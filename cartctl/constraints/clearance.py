@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from abc import abstractmethod
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -14,9 +14,8 @@ from cartctl.constraints.base import Constraint, Rows
 from cartctl.constraints.clearance_kernel import MOST_ERROR, REST, clearance_rows
 from cartctl.constraints.curvature import joint_order
 from cartctl.constraints.intervals import Box, spread
-from cartctl.errors import ParameterError
 from cartctl.model.robot import Robot
-from cartctl.model.scene import Arrangement, Scene, excluded, with_itself, with_scene
+from cartctl.model.scene import AroundItself, AroundScene, Arrangement, Scene, excluded
 from cartctl.model.state import State
 
 _NEAR = 0.03  # m beyond the margin: where joints can stop within a step, what is farther need not be slowed yet
@@ -43,16 +42,15 @@ class ClearanceConstraint(Constraint):
     joints' bounds, rows yield: the status of the solution is INFEASIBLE.
     """
 
-    def __init__(self, margin: Any, deceleration: Any, recovery_speed: Any, name: str) -> None:
+    def __init__(
+        self, arranged: Callable[[Robot], Arrangement], margin: Any, deceleration: Any, recovery_speed: Any, name: str
+    ) -> None:
+        self.arrangement = arranged  # the pairs of one robot, worked out once
         self.margin = checks.number("margin", margin, low=0.0)
         self.deceleration = checks.number("deceleration", deceleration, low=0.0, strict=True)
         self.recovery_speed = checks.number("recovery_speed", recovery_speed, low=0.0, strict=True)
         self.name = name
         self._order: tuple[Robot, FloatArray] | None = None
-
-    @abstractmethod
-    def arrangement(self, robot: Robot) -> Arrangement:
-        """The pairs of one robot, worked out once."""
 
     def check(self, robot: Robot) -> None:
         """Whatever the scene hangs on must exist; raises FrameNotFound, ParameterError."""
@@ -153,18 +151,8 @@ class Avoid(ClearanceConstraint):
         recovery_speed: float = 0.1,
         name: str = "clearance",
     ) -> None:
-        if not isinstance(scene, Scene):
-            raise ParameterError(f"scene is a {type(scene).__name__}; expected a cc.Scene")
-        super().__init__(margin, deceleration, recovery_speed, name)
+        super().__init__(AroundScene(scene, points), margin, deceleration, recovery_speed, name)
         self.scene, self.points = scene, points
-        self._known: tuple[Robot, int, Arrangement] | None = None
-
-    def arrangement(self, robot: Robot) -> Arrangement:
-        """The robot's links against the obstacles; raises FrameNotFound, ParameterError."""
-        known = self._known
-        if known is None or known[0] is not robot or known[1] != self.scene.version:
-            known = self._known = (robot, self.scene.version, with_scene(robot, self.scene, self.points))
-        return known[2]
 
 
 class AvoidSelf(ClearanceConstraint):
@@ -184,15 +172,8 @@ class AvoidSelf(ClearanceConstraint):
         recovery_speed: float = 0.1,
         name: str = "self-clearance",
     ) -> None:
-        super().__init__(margin, deceleration, recovery_speed, name)
+        super().__init__(AroundItself(srdf), margin, deceleration, recovery_speed, name)
         self.srdf = srdf
-        self._known: tuple[Robot, Arrangement] | None = None
-
-    def arrangement(self, robot: Robot) -> Arrangement:
-        """The robot's links against each other; raises UrdfError."""
-        if self._known is None or self._known[0] is not robot:
-            self._known = (robot, with_itself(robot, self.srdf))
-        return self._known[1]
 
     @staticmethod
     def excluded(robot: Robot) -> dict[tuple[str, str], str]:

@@ -9,7 +9,6 @@ import numpy as np
 
 from cartctl import checks
 from cartctl.checks import FloatArray
-from cartctl.errors import ParameterError, ShapeError
 
 if TYPE_CHECKING:
     from cartctl.model.robot import Robot
@@ -34,7 +33,7 @@ class Friction:
 
     def __post_init__(self) -> None:
         for name in ("viscous", "coulomb"):
-            object.__setattr__(self, name, _coefficients(name, getattr(self, name)))
+            object.__setattr__(self, name, checks.amounts(name, getattr(self, name)))
         object.__setattr__(self, "width", checks.number("width", self.width, low=0.0, strict=True))
 
     @classmethod
@@ -45,19 +44,8 @@ class Friction:
     def check(self, nv: int) -> None:
         """Refuse coefficients of another robot; raises ShapeError."""
         for name in ("viscous", "coulomb"):
-            value = getattr(self, name)
-            if isinstance(value, np.ndarray) and value.shape != (nv,):
-                raise ShapeError(f"friction: {name} has shape {value.shape}; expected a number or ({nv},)")
+            checks.fits(f"friction: {name}", getattr(self, name), nv)
 
     def torque(self, v: FloatArray) -> FloatArray:
         """``f(v)`` (nv,), N m or N; ``f . v >= 0`` is the power that is lost."""
         return self.viscous * v + self.coulomb * np.tanh(v / self.width)  # type: ignore[no-any-return]
-
-
-def _coefficients(name: str, value: Any) -> float | FloatArray:
-    if np.ndim(value) == 0:
-        return checks.number(name, value, low=0.0)
-    array = checks.vector(name, value)
-    if (array < 0.0).any():
-        raise ParameterError(f"{name} is {array}; expected numbers of at least 0")
-    return array

@@ -13,7 +13,7 @@ from cartctl.algebra.solution import Solution
 from cartctl.checks import FloatArray
 from cartctl.constraints import Box, Constraint, Rows
 from cartctl.dynamics.friction import Friction
-from cartctl.errors import ParameterError, ShapeError, UnsupportedProblem
+from cartctl.errors import UnsupportedProblem
 from cartctl.levels.acceleration_bounds import AccelerationBounds
 from cartctl.levels.approach import Approach
 from cartctl.levels.base import UNCONFINED, Command, Confines, Level, Motion, Secondary, direction, require_finite
@@ -58,7 +58,7 @@ class AccelerationLevel(Level):
         friction: Friction | None = None,
         wrenches: Wrench | Sequence[Wrench] = (),
     ) -> None:
-        self.damping = None if damping is None else damping_of(damping)
+        self.damping = None if damping is None else checks.amounts("damping", damping, checks.PER_SECOND)
         self._damps = self.damping is not None and bool(np.any(self.damping))
         self.loads: Loads = Loads(friction, wrenches)
 
@@ -110,7 +110,8 @@ class AccelerationLevel(Level):
 
     def _reference(self, state: State, secondary: Secondary, otherwise: float) -> FloatArray | None:
         """``u0 = -k grad H - D v`` (nv,), None where there is neither; otherwise: D where none was chosen."""
-        D = otherwise if self.damping is None else spread_over(self.damping, state.robot.nv)
+        D = otherwise if self.damping is None else self.damping
+        checks.fits("damping", D, state.robot.nv)
         braking = -D * state.v if np.any(D) else None
         if secondary.objective is None:
             return braking
@@ -144,20 +145,3 @@ def _commanded(task: Task, reference: Reference, J: FloatArray, v: FloatArray) -
     rate = -(J @ v) if reference.rate is None else reference.rate - J @ v
     b = k * (2.0 * rate + k * reference.error)
     return b if reference.acceleration is None else b + reference.acceleration
-
-
-def spread_over(damping: float | FloatArray, nv: int) -> float | FloatArray:
-    """D, if it fits nv joints; raises ShapeError."""
-    if isinstance(damping, np.ndarray) and damping.shape != (nv,):
-        raise ShapeError(f"damping has shape {damping.shape}; expected a number or ({nv},)")
-    return damping
-
-
-def damping_of(damping: Any) -> float | FloatArray:
-    """D as a number or an array; raises ParameterError, ShapeError, NonFiniteError."""
-    if np.ndim(damping) == 0:
-        return checks.number("damping", damping, low=0.0)
-    array = checks.vector("damping", damping)
-    if (array < 0.0).any():
-        raise ParameterError(f"damping is {array}; expected numbers of at least 0, in 1/s")
-    return array

@@ -62,6 +62,10 @@ class Walls(NamedTuple):
     c_lower: FloatArray
     c_upper: FloatArray
 
+    def box(self) -> Walls:
+        """Without the rows."""
+        return self if not self.C.shape[0] else Walls(self.lower, self.upper, self.C[:0], _NOTHING, _NOTHING)
+
 
 class Directions(NamedTuple):
     """The singular directions of a task: U (m, k), Vt (k, nv), their rows of figures D, and the size of J."""
@@ -94,11 +98,8 @@ class Approach:
         self._joints = np.array([slowing, speed, still])
         self._dt, self._scratch, self._scales = dt, scratch, solver.scales
         self._bent: dict[int, FloatArray] = {}  # by task: the motion inwards, when it was last clear
-        self._above, self._walls = (
-            Above(ranked=not solver.stacks),
-            Walls(_NOTHING, _NOTHING, np.zeros((0, 0)), _NOTHING, _NOTHING),
-        )
-        self._open = self._walls
+        self._above = Above(ranked=not solver.stacks)
+        self._walls = Walls(_NOTHING, _NOTHING, np.zeros((0, 0)), _NOTHING, _NOTHING)
         self._directions, self._hold = directions.compiled, hold.compiled
 
     def begin(
@@ -113,7 +114,6 @@ class Approach:
         C, c_lower, c_upper = (np.zeros((0, state.v.shape[0])), _NOTHING, _NOTHING) if rows is None else rows
         low, high = (_NOTHING, _NOTHING) if lower is None or upper is None else (lower, upper)
         self._walls = Walls(low, high, C, c_lower, c_upper)
-        self._open = self._walls if rows is None else Walls(low, high, C[:0], c_lower[:0], c_upper[:0])
 
     def command(self, task: Task, state: State, J: FloatArray, reference: Reference, b: FloatArray) -> Approached:
         """``b`` (m,) held back along directions in which the robot could not stop in time."""
@@ -145,7 +145,9 @@ class Approach:
         k = min(m, n)
         U, Vt, D = np.empty((m, k)), np.empty((k, n)), np.empty((ROWS, k))
         rate, error = _NOTHING if reference.rate is None else reference.rate, reference.error
-        walls = self._walls if reference.rate is None else self._open  # one stops before a wall, and slides along it
+        walls = (
+            self._walls if reference.rate is None else self._walls.box()
+        )  # one stops before a wall, and slides along it
         bounded = walls.lower.shape[0] > 0
         self._directions(J, b, y, rate, error, self._joints, *walls, self._dt, size, bounded, U, Vt, D)
         for i in np.flatnonzero(D[ASKED]):

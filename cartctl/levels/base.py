@@ -68,7 +68,8 @@ class Secondary(NamedTuple):
     """What the redundancy is spent on.
 
     share: of the objective, in [0, 1]. extend: K in 1/s of the rows that keep the objective extremal, None where the
-    solver spends it through u0. weighing: the name of the metric, "" for the caller's own.
+    solver spends it through u0. weighing: the name of the metric, "" for the caller's own. spends: whether the solver
+    takes a u0 at all.
     """
 
     objective: Objective | None = None

@@ -7,13 +7,14 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from cartctl import checks
 from cartctl.algebra.problem import Equation, Problem
 from cartctl.algebra.solution import Solution
 from cartctl.algebra.svd import scale
 from cartctl.checks import FloatArray, is_finite
 from cartctl.constraints import Box, Constraint, Rows
 from cartctl.dynamics.friction import Friction
-from cartctl.levels.acceleration import AccelerationLevel, damping_of
+from cartctl.levels.acceleration import AccelerationLevel
 from cartctl.levels.acceleration_bounds import AccelerationBounds
 from cartctl.levels.base import UNCONFINED, Command, Confines, Level, Motion, Secondary, require_finite
 from cartctl.levels.bounds import JointBounds
@@ -71,7 +72,7 @@ class TorqueLevel(Level):
         friction: Friction | None = None,
         wrenches: Wrench | Sequence[Wrench] = (),
     ) -> None:
-        self.damping = None if damping is None else damping_of(damping)
+        self.damping = None if damping is None else checks.amounts("damping", damping, checks.PER_SECOND)
         self._damps = damping is not None and bool(np.any(self.damping))
         self.loads: Loads = Loads(friction, wrenches)
         self._motion = AccelerationLevel()
@@ -98,9 +99,9 @@ class TorqueLevel(Level):
         confines: Confines = UNCONFINED,
     ) -> tuple[Problem, list[Reference]]:
         """The problem of this instant, and the references it was made from; raises NonFiniteError, ShapeError."""
-        lower, upper, outside, approach, torque = confines
+        lower, upper, outside, _, torque = confines
         M = state.mass_matrix  # before the Jacobians, which come along
-        J, rest, sizes, references = self._asked(state, tasks, times, anchors, confines)
+        J, rest, sizes, references = self._asked(state, tasks, times, anchors)
         h = self.loads.effects(state)
         low, high = (_NONE, _NONE) if lower is None or upper is None else (lower, upper)
         (m, nv), r = J.shape, low.shape[0]
@@ -126,10 +127,9 @@ class TorqueLevel(Level):
         tasks: Sequence[Task],
         times: Sequence[float],
         anchors: Sequence[Any],
-        confines: Confines,
     ) -> Asked:
         """The tasks' rows on a; of one task in pieces, for the kernel to put together."""
-        if len(tasks) == 1 and confines.approach is None:
+        if len(tasks) == 1:
             task = tasks[0]
             reference = task.reference(state, times[0], anchors[0])
             J, gain = task.jacobian(state), task.gain
@@ -138,8 +138,7 @@ class TorqueLevel(Level):
             acceleration = _NONE if reference.acceleration is None else reference.acceleration
             k = (0.0, gain) if isinstance(gain, np.ndarray) else (gain, _NONE)
             return J, (drift, reference.error, rate, acceleration, *k), J.shape[:1], [reference]
-        confines = Confines(confines.lower, confines.upper, None, confines.approach)
-        problem, references = self._motion.problem(state, tasks, times, anchors, Secondary(), None, confines)
+        problem, references = self._motion.problem(state, tasks, times, anchors, Secondary(), None)
         J, b, drift = (np.concatenate([getattr(e, name) for e in problem.equations]) for name in ("A", "b", "drift"))
         return J, (drift, b, _NONE, b, 0.0, _NONE), problem.sizes, references
 

@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from cartctl import checks
 from cartctl.checks import FloatArray
-from cartctl.levels.acceleration import spread_over
 from cartctl.levels.base import Secondary, direction
 from cartctl.model.state import State
 
@@ -29,7 +29,8 @@ def drawn_to(
         damping = DAMPING if mapped else of_inertia(state.mass_matrix.diagonal())
     elif objective is None and not np.any(damping):
         return None
-    u0 = spread_over(damping, state.robot.nv) * -state.v
+    checks.fits("damping", damping, state.robot.nv)
+    u0 = damping * -state.v
     if objective is not None:
         u0 = u0 + secondary.share * direction(objective, state)
     return np.asarray(h + (state.mass_matrix @ u0 if mapped else u0))

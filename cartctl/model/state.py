@@ -28,8 +28,8 @@ class State:
 
     Frame quantities are in LOCAL_WORLD_ALIGNED axes (origin at the frame, axes of the world), linear part first.
     Arrays handed out are read-only and stay valid for good. time: s, when the robot is there, for what moves by itself
-    (the obstacles of a scene). Made by :meth:`cartctl.Robot.state`, which checks q and v;
-    raises FrameNotFound for an unknown frame.
+    (the obstacles of a scene). Made by :meth:`cartctl.Robot.state`, which checks q and v; raises FrameNotFound for an
+    unknown frame.
     """
 
     __slots__ = (
@@ -165,7 +165,7 @@ class State:
         M = self._cache.get("M")
         if M is None:
             M = _mass_matrix(self._model, self._data, self.q, _WORLD)  # a copy of its own, both triangles filled
-            M = M.reshape(-1, 1) if M.ndim < 2 else M  # with one joint, Pinocchio hands out a vector
+            M = _square(M)
             M.flags.writeable = False
             self._cache["M"] = M
             self._kinematics = True  # placements and joint Jacobians come along

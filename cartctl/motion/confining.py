@@ -39,7 +39,7 @@ class Confining:
         dt: float,
         waiting: Sequence[Task],
     ) -> None:
-        self._robot, self._level, self._dt = robot, level, dt
+        self._level, self._dt = level, dt
         self._constraints = _checked(constraints, robot, solver)
         joints = _joints(disabled, robot)
         self._bounds: JointBounds | None = None
@@ -95,7 +95,7 @@ class Confining:
         T, t, S, s = self._level.motion(state)
         layers = []
         if self._bounds is not None and lower is not None and upper is not None:
-            q = self._robot.coordinates(state.q)
+            q = self._coordinates(state.q)
             for name, box in intervals(self._bounds, q, state.v, Box(lower, upper)).items():
                 layers.append(Layer(name, T, box.lower - t, box.upper - t))
         if rows is not None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -49,7 +48,7 @@ class Plant:
         self.payloads = (payload,) if isinstance(payload, Payload) else tuple(payload)
         self.masses = checks.number("masses", masses, low=0.0, strict=True)
         self.loads = Loads(friction, wrenches)
-        self.noise = _deviation(noise)
+        self.noise = checks.amounts("noise", noise, "standard deviations of at least 0")
         if isinstance(seed, bool) or not isinstance(seed, (int, np.integer)) or seed < 0:
             raise ParameterError(f"seed is {seed!r}; expected a whole number of at least 0")
         self.seed = int(seed)
@@ -68,8 +67,7 @@ class Plant:
         known = Loads() if loads is None else loads
         friction = known.friction if self.loads.friction is None else self.loads.friction
         every = Loads(friction, (*known.wrenches, *self.loads.wrenches))
-        if isinstance(self.noise, np.ndarray) and self.noise.shape != (robot.nv,):
-            raise ShapeError(f"noise has shape {self.noise.shape}; expected a number or ({robot.nv},)")
+        checks.fits("noise", self.noise, robot.nv)
         return Body(real, every, self.noise, self.seed)
 
 
@@ -125,15 +123,6 @@ class Body:
     def potential(self, q: FloatArray) -> float:
         """``U(q)``, J, zero at the origin of the world."""
         return float(pin.computePotentialEnergy(self.robot.model, self._data, q))
-
-
-def _deviation(noise: Any) -> float | FloatArray:
-    if np.ndim(noise) == 0:
-        return checks.number("noise", noise, low=0.0)
-    array = checks.vector("noise", noise)
-    if (array < 0.0).any():
-        raise ParameterError(f"noise is {array}; expected standard deviations of at least 0")
-    return array
 
 
 def _scaled(robot: Robot, factor: float) -> Robot:

@@ -89,7 +89,7 @@ def _check(arrays: dict[str, Any], tasks: list[TaskRecord], path: Path, books: l
     per_sample += books
     per_sample += [a for t in tasks for a in (t.error, t.singular_values, t.pose, t.target) if a is not None]
     per_step = [arrays["command"], arrays["solve_time"], arrays["status"], *(t.scale for t in tasks)]
-    torques = [arrays[n] for n in ("torque",) if n in arrays]
+    torques = [arrays["torque"]] if "torque" in arrays else []
     per_step += torques
     lengths = {len(a) for a in per_sample} == {samples} and {len(a) for a in per_step} == {steps}
     if not lengths or samples not in (steps + 1, 0):

@@ -5,6 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from typing import TYPE_CHECKING
 
+from cartctl import checks
 from cartctl.checks import FloatArray
 from cartctl.model.differences import central
 from cartctl.model.robot import Robot
@@ -67,3 +68,8 @@ class Objective(ABC):
     def __sub__(self, other: Objective) -> WeightedSum:
         """``self`` and the other one the other way round."""
         return self + -other if isinstance(other, Objective) else NotImplemented
+
+
+def checked_gain(objective: Objective) -> None:
+    """``gain`` as a positive number, of a frozen objective, too; raises ParameterError, NonFiniteError."""
+    object.__setattr__(objective, "gain", checks.number("gain", objective.gain, low=0.0, strict=True))

@@ -6,16 +6,15 @@ H is a distance, not its square, so that its gradient does not die away at conta
 
 from __future__ import annotations
 
-from abc import abstractmethod
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
 from cartctl import checks
 from cartctl.checks import FloatArray
-from cartctl.errors import ParameterError
 from cartctl.model.robot import Robot
-from cartctl.model.scene import Arrangement, Contacts, Scene, with_itself, with_scene
+from cartctl.model.scene import AroundItself, AroundScene, Arrangement, Contacts, Scene
 from cartctl.model.scene.smooth import smallest
 from cartctl.model.state import State
 from cartctl.objectives.base import Objective
@@ -33,14 +32,11 @@ class SmoothClearance(Objective):
 
     maximise = True
 
-    def __init__(self, gain: float, smoothing: float, within: float) -> None:
+    def __init__(self, arranged: Callable[[Robot], Arrangement], gain: float, smoothing: float, within: float) -> None:
+        self.arrangement = arranged  # the pairs of one robot, worked out once
         self.gain = checks.number("gain", gain, low=0.0, strict=True)
         self.smoothing = checks.number("smoothing", smoothing, low=0.0, strict=True)
         self.within = np.inf if within == np.inf else checks.number("within", within, low=0.0, strict=True)
-
-    @abstractmethod
-    def arrangement(self, robot: Robot) -> Arrangement:
-        """The pairs of one robot, worked out once."""
 
     def value(self, state: State) -> float:
         """``H(q)``, m; ``within`` where nothing is near (the largest number there is, if that is inf)."""
@@ -85,18 +81,8 @@ class Clearance(SmoothClearance):
         smoothing: float = 0.02,
         within: float = 0.2,
     ) -> None:
-        if not isinstance(scene, Scene):
-            raise ParameterError(f"scene is a {type(scene).__name__}; expected a cc.Scene")
-        super().__init__(gain, smoothing, within)
+        super().__init__(AroundScene(scene, points), gain, smoothing, within)
         self.scene, self.points = scene, points
-        self._known: tuple[Robot, int, Arrangement] | None = None
-
-    def arrangement(self, robot: Robot) -> Arrangement:
-        """The robot's links against the obstacles."""
-        known = self._known
-        if known is None or known[0] is not robot or known[1] != self.scene.version:
-            known = self._known = (robot, self.scene.version, with_scene(robot, self.scene, self.points))
-        return known[2]
 
 
 class SelfClearance(SmoothClearance):
@@ -108,12 +94,5 @@ class SelfClearance(SmoothClearance):
     """
 
     def __init__(self, gain: float = 1.0, *, srdf: Any = None, smoothing: float = 0.02, within: float = 0.2) -> None:
-        super().__init__(gain, smoothing, within)
+        super().__init__(AroundItself(srdf), gain, smoothing, within)
         self.srdf = srdf
-        self._known: tuple[Robot, Arrangement] | None = None
-
-    def arrangement(self, robot: Robot) -> Arrangement:
-        """The robot's links against each other."""
-        if self._known is None or self._known[0] is not robot:
-            self._known = (robot, with_itself(robot, self.srdf))
-        return self._known[1]

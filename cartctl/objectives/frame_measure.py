@@ -20,8 +20,8 @@ from cartctl.checks import FloatArray
 from cartctl.model.axes import pose_rows
 from cartctl.model.robot import Robot
 from cartctl.model.state import State
-from cartctl.objectives.base import Objective
-from cartctl.objectives.scaling import check_scale, checked_gain, checked_scale, finite
+from cartctl.objectives.base import Objective, checked_gain
+from cartctl.objectives.scaling import check_scale, checked_scale, finite
 
 
 class Spread(NamedTuple):

@@ -10,8 +10,8 @@ import numpy as np
 from cartctl.checks import FloatArray
 from cartctl.model.robot import Robot
 from cartctl.model.state import State
-from cartctl.objectives.base import Objective
-from cartctl.objectives.scaling import check_scale, checked_gain, checked_scale, reciprocal
+from cartctl.objectives.base import Objective, checked_gain
+from cartctl.objectives.scaling import check_scale, checked_scale, reciprocal
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -6,11 +6,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from cartctl import checks
 from cartctl.checks import FloatArray
 from cartctl.model.limits import Limits
 from cartctl.model.state import State
-from cartctl.objectives.base import Objective
+from cartctl.objectives.base import Objective, checked_gain
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,7 +27,7 @@ class JointRange(Objective):
     _known: dict[int, tuple[FloatArray, FloatArray, bool]] = field(default_factory=dict, init=False, repr=False)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "gain", checks.number("gain", self.gain, low=0.0, strict=True))
+        checked_gain(self)
 
     def value(self, state: State) -> float:
         """``H(q)``, no unit."""

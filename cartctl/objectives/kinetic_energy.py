@@ -9,7 +9,7 @@ from cartctl import checks
 from cartctl.checks import FloatArray
 from cartctl.model.robot import Robot
 from cartctl.model.state import State
-from cartctl.objectives.base import Objective
+from cartctl.objectives.base import Objective, checked_gain
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,7 +28,7 @@ class KineticEnergy(Objective):
     gain: float = 1.0
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "gain", checks.number("gain", self.gain, low=0.0, strict=True))
+        checked_gain(self)
         if self.velocity is not None:
             object.__setattr__(self, "velocity", checks.vector("velocity", self.velocity, largest=checks.LARGEST))
 

@@ -13,7 +13,7 @@ from cartctl.checks import FloatArray
 from cartctl.errors import ParameterError
 from cartctl.model.robot import Robot
 from cartctl.model.state import State
-from cartctl.objectives.base import Objective
+from cartctl.objectives.base import Objective, checked_gain
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,7 +32,7 @@ class Posture(Objective):
     gain: float = 1.0
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "gain", checks.number("gain", self.gain, low=0.0, strict=True))
+        checked_gain(self)
         if self.target is not None:
             object.__setattr__(self, "target", checks.vector("target", self.target, largest=checks.LARGEST))
         if self.weights is not None:

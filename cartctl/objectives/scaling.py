@@ -12,11 +12,6 @@ from cartctl.errors import ParameterError
 from cartctl.model.robot import Robot
 
 
-def checked_gain(objective: Any) -> None:
-    """``gain`` as a positive number; raises ParameterError, NonFiniteError."""
-    object.__setattr__(objective, "gain", checks.number("gain", objective.gain, low=0.0, strict=True))
-
-
 def checked_scale(objective: Any) -> None:
     """``scale`` as None, ``"limits"`` or an array; raises ParameterError, ShapeError, NonFiniteError."""
     scale = objective.scale

@@ -18,7 +18,7 @@ import numpy as np
 from cartctl import checks
 from cartctl.algebra.problem import FITS
 from cartctl.checks import FloatArray
-from cartctl.errors import ParameterError, ShapeError, TargetError
+from cartctl.errors import ShapeError, TargetError
 from cartctl.model.robot import Robot
 from cartctl.model.state import State
 
@@ -52,7 +52,7 @@ class Task(ABC):
     kind: ClassVar[str]
 
     def __init__(self, *, gain: Any, weight: float, fit: str, name: str) -> None:
-        self.gain = _gain(gain)
+        self.gain = checks.amounts("gain", gain, checks.PER_SECOND)
         self.weight = checks.number("weight", weight, low=0.0)
         self.fit = checks.choice("fit", fit, FITS)
         self.name = name
@@ -109,12 +109,3 @@ class Task(ABC):
     def observe(self, state: State, t: float, anchor: Any) -> Observation | None:
         """Value and target in the world, for pictures; None where there is nothing to draw."""
         return None
-
-
-def _gain(gain: Any) -> float | FloatArray:
-    if np.ndim(gain) == 0:
-        return checks.number("gain", gain, low=0.0)
-    array = checks.vector("gain", gain)
-    if (array < 0.0).any():
-        raise ParameterError(f"gain is {array}; expected numbers of at least 0, in 1/s")
-    return array

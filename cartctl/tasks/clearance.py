@@ -14,9 +14,9 @@ import numpy as np
 
 from cartctl import checks
 from cartctl.checks import FloatArray
-from cartctl.errors import ParameterError, TargetError
+from cartctl.errors import TargetError
 from cartctl.model.robot import Robot
-from cartctl.model.scene import Arrangement, Contacts, Scene, with_scene
+from cartctl.model.scene import AroundScene, Arrangement, Contacts, Scene
 from cartctl.model.scene.smooth import smallest
 from cartctl.model.state import State
 from cartctl.tasks.base import Reference, Task
@@ -61,13 +61,11 @@ class ClearanceTask(Task):
         name: str = "clearance",
     ) -> None:
         super().__init__(gain=gain, weight=weight, fit=fit, name=name)
-        if not isinstance(scene, Scene):
-            raise ParameterError(f"scene is a {type(scene).__name__}; expected a cc.Scene")
         self.scene, self.points = scene, points
+        self._arranged = AroundScene(scene, points)
         self.band = checks.number("band", band, low=0.0, strict=True)
         self.target = distance
-        self._known: tuple[Robot, int, Arrangement] | None = None
-        self._last: tuple[State, int, Nearest] | None = None
+        self._last: tuple[State, int, Arrangement, Nearest] | None = None
 
     def take_target(self, value: Any, label: str) -> None:
         """The distance to keep, m >= 0."""
@@ -83,7 +81,7 @@ class ClearanceTask(Task):
     def check(self, robot: Robot) -> None:
         """Whatever the scene hangs on must exist; raises FrameNotFound, ParameterError."""
         super().check(robot)
-        self._arrangement(robot)
+        self._arranged(robot)
 
     def distance(self, state: State) -> float:
         """The smallest distance, m; the distance to keep and its band where nothing is nearer."""
@@ -120,14 +118,15 @@ class ClearanceTask(Task):
         return Reference(np.array([found.share * (self._distance - found.distance)]), np.array([rate]))
 
     def _nearest(self, state: State) -> Nearest:
-        if self._last is not None and self._last[0] is state and self._last[1] == state.stamp:
-            return self._last[2]
+        last, arrangement = self._last, self._arranged(state.robot)
+        if last is not None and last[0] is state and last[1] == state.stamp and last[2] is arrangement:
+            return last[3]
         found = self._measured(state)
-        self._last = (state, state.stamp, found)
+        self._last = (state, state.stamp, arrangement, found)
         return found
 
     def _measured(self, state: State) -> Nearest:
-        arrangement, tau = self._arrangement(state.robot), _SMOOTH * self.band
+        arrangement, tau = self._arranged(state.robot), _SMOOTH * self.band
         edge = self._distance + self.band
         contacts = arrangement.within(state, edge + _FADE * tau)
         if not len(contacts.pairs):
@@ -147,10 +146,3 @@ class ClearanceTask(Task):
         here = obstacle.pose(state.time).actInv(contacts.second[k])
         ahead, behind = (obstacle.pose(state.time + h).act(here) for h in (_STEP, -_STEP))
         return -float(contacts.normal[k] @ (ahead - behind)) / (2.0 * _STEP)
-
-    def _arrangement(self, robot: Robot) -> Arrangement:
-        known = self._known
-        if known is None or known[0] is not robot or known[1] != self.scene.version:
-            known = self._known = (robot, self.scene.version, with_scene(robot, self.scene, self.points))
-            self._last = None
-        return known[2]
