@@ -68,11 +68,17 @@ NEARLY_SINGULAR = {
     (20251, 445057): "a bound met with a member that then leaves",
     (20252, 1444000): "a row that cannot move sends the line search far away",
     (20251, 724667): "a multiplier turned by the level that holds its bound, not by another's round-off",
-}
-OPEN = {
-    (20252, 276799): "stuck",
+    (20252, 276799): "steps that lower the misses no more are taken for ever",
     (20253, 147333): "rows of one level a million times smaller than the others",
-    (20253, 799927): "stuck",
+    (30001, 1372844): "an entry of a step is no surer than its largest; from a guess it went 1e13 far",
+    (30001, 1066367): "a u of nothing beside bounds of 1",
+    (30002, 1244659): "a multiplier turned by millions of another level's",
+    (30002, 3582090): "a miss of the last bits is none",
+    (30001, 195215): "a contradiction that is none in another order of the joints",
+    (30001, 1390428): "the same, two levels deep",
+    (30003, 305765): "rows of dust that contradict each other where the box keeps u from 0",
+    (30003, 1995324): "feasible at a single point of the rows",
+    (30003, 2195699): "what nearly dependent members magnify is no licence to miss a row",
 }
 
 
@@ -82,11 +88,10 @@ def test_nearly_singular_levels_have_their_certificates(soaking, problem):
     assert not batch.run(*problem, 1).failures, NEARLY_SINGULAR[problem]
 
 
-@pytest.mark.xfail(strict=True, reason="open: some twenty in a million of these problems have no certificate")
-@pytest.mark.parametrize("problem", OPEN, ids=str)
-def test_those_without(soaking, problem):
+@pytest.mark.xfail(strict=True, reason="open: stuck, in every order, at a level with a singular value of 7e-6")
+def test_one_without(soaking):
     batch, _, _ = soaking
-    assert not batch.run(*problem, 1).failures, OPEN[problem]
+    assert not batch.run(20253, 799927, 1).failures
 
 
 @pytest.mark.parametrize("s", [0.3, 0.5, 1.0])

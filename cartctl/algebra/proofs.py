@@ -24,6 +24,7 @@ PRIMAL, DUAL, GAP = 0, 1, 2
 _NOISE = 1e-12  # of the largest multiplier
 _CLEAR = 1e-14  # of the terms of h: a sum this small has no sign
 _MISSED = 1e-10  # relative: an interval missed by less is met
+_LAST_BITS = 1e-14  # relative: a miss this small is round-off
 _GROUND = 1e-8  # of the largest bound: a u smaller than this is judged as if it were this large
 _COARSE = 1e-4  # of u and u0: steps below this are judged as if they were this large
 _MET = 1e-3  # of the rows of a fitted level: misses below this, too
@@ -62,14 +63,15 @@ def check_proofs(
     """
     n, M, r, p = u.shape[0], A.shape[0], C.shape[0], sizes.shape[0]
     x, low, high, span = np.empty(M + n + r), np.empty(M + n + r), np.empty(M + n + r), np.ones(M + n + r)
-    given = np.zeros(M + n + r)
+    given, missed = np.zeros(M + n + r), np.zeros(M + n + r)
     level = np.empty(M + n + r, np.int64)
     holder = np.full(M + n + r, p)  # the first level whose proof needs a row
     rows = (A, b, d, sizes, fits, natural, lower, upper, C, c_lower, c_upper)
     ground = _GROUND * max(_farthest(lower), _farthest(upper))
+    least = ground * (pull / reach if reach > 0.0 else 1.0)  # forces below this are none
     if 0.0 < reach < ground:
-        pull, reach = pull * ground / reach, ground
-    size = _rows(*rows, u, reach, scales, x, low, high, span, level)
+        pull, reach = least, ground
+    size = _rows(*rows, u, reach, scales, x, low, high, span, level, missed)
     for i in range(M):
         given[i] = abs(b[i]) + (abs(d[i]) if d.shape[0] > 0 else 0.0)
     for k in range(p + 1):
@@ -81,17 +83,19 @@ def check_proofs(
         if k < p and fits[k] != SCALED:
             for i in range(M + n + r):
                 if level[i] == k:
-                    own[i] -= min(x[i] - low[i], 0.0) + max(x[i] - high[i], 0.0)
+                    own[i] -= missed[i]
         if k < p and scales[k] == scales[k]:
             weight = _weight(x, low, high, span, level, k, size) if fits[k] != SCALED else 0.0
             _hold(own, holder, k, span, weight)
+        added = 0.0
         for j in range(k - 1, -1, -1):
             if scales[j] == scales[j]:
-                _turn(own, z[j], x, low, high, level, holder, j, span)
+                added = max(added, _turn(own, z[j], x, low, high, level, holder, j, span))
         rest, terms = _stationarity(A, C, own, span, n, force, k == p)
+        terms = max(terms, added)
         slack, value, slope, total = _value(own, x, low, high, level, b, k, span)
         if k == p:
-            terms = max(terms, _COARSE * pull)
+            terms = max(terms, _COARSE * pull, least)
         elif fits[k] != SCALED:
             terms = max(terms, _MET * _weight(x, low, high, span, level, k, size))
         residuals[k, DUAL] = rest / terms if terms > 0.0 else 0.0
@@ -140,8 +144,9 @@ def _rows(
     high: FloatArray,
     span: FloatArray,
     level: NDArray[np.int64],
+    missed: FloatArray,
 ) -> float:
-    """Value, interval, span and level of every row (-1: hard); the size of u, at least the given one.
+    """Value, interval, span, level (-1: hard) and miss of every row; the size of u, at least the given one.
 
     A skipped level asks for what it asks at s = 1. The span of a row is its norm, of an equation the largest of its
     task: a row that is nothing beside the others is zero.
@@ -183,6 +188,10 @@ def _rows(
         if widest > 0.0:
             size = max(size, 1e-2 * command / widest)
         row += sizes[k]
+    for i in range(M + n + r):
+        missed[i] = min(x[i] - low[i], 0.0) + max(x[i] - high[i], 0.0)
+        if abs(missed[i]) <= _LAST_BITS * (span[i] * size + abs(x[i])):
+            missed[i] = 0.0
     for i in range(M + n + r - rest, M + n + r):
         miss = _MISSED * (span[i] * size + abs(x[i]))
         if low[i] - miss <= x[i] <= high[i] + miss:
@@ -207,8 +216,11 @@ def _turn(
     holder: NDArray[np.int64],
     j: int,
     span: FloatArray,
-) -> None:
-    """Add so much of what cancels at level j that the inequalities it holds have the sign of the bound they are at."""
+) -> float:
+    """Add so much of what cancels at level j that the inequalities it holds have the sign of the bound they are at.
+
+    The largest term of what was added to: sums of it cancel no further than to its round-off.
+    """
     share, most = 0.0, _largest(own, span)
     for i in range(x.shape[0]):
         if holder[i] != j or abs(own[i]) * span[i] <= _NOISE * most:
@@ -218,9 +230,11 @@ def _turn(
         sign = 1.0 if x[i] - low[i] < high[i] - x[i] else -1.0
         if sign * own[i] < 0.0 and sign * earlier[i] > 0.0:
             share = max(share, -own[i] / earlier[i])
-    if share > 0.0:
-        for i in range(x.shape[0]):
-            own[i] += share * earlier[i]
+    if share == 0.0:
+        return 0.0
+    for i in range(x.shape[0]):
+        own[i] += share * earlier[i]
+    return most
 
 
 @part

@@ -12,7 +12,7 @@ from cartctl.kernels import part
 from cartctl.solvers.exact.descent import SETTLED, STALLED, load, settle
 from cartctl.solvers.exact.fitted import fitted_level
 from cartctl.solvers.exact.inequalities import EQUAL, OUT, SILENT, Inequalities, drop_all_free, normal_of
-from cartctl.solvers.exact.kinds import CONTRADICTORY, FITTED, LOST_RANK, SCALED, STUCK
+from cartctl.solvers.exact.kinds import CONTRADICTORY, DOUBT, FITTED, LOST_RANK, SCALED, STUCK
 from cartctl.solvers.exact.proof import write_multipliers
 from cartctl.solvers.exact.rows import Equations, Levels, fix_rows, task_size
 from cartctl.solvers.exact.scaled import MET, SKIPPED, scaled_level
@@ -110,8 +110,7 @@ def by_levels(
                 return CONTRADICTORY
             feasible = True
             scales[k] = math.nan
-            if outcome < 0:
-                flags |= STUCK
+            flags |= DOUBT if outcome >= 0 else DOUBT | STUCK
         feasible = feasible or outcome == MET
         k += 1
     if not settled:
@@ -121,7 +120,7 @@ def by_levels(
         if code != SETTLED and not feasible:
             return CONTRADICTORY
         if code != SETTLED:
-            flags |= STUCK
+            flags |= DOUBT | STUCK
     if proofs.shape[1] > 0:
         combine(w, w.V[G], w.V[LAM])
         write_multipliers(w, q, e.norm, proofs[p])

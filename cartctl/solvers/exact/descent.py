@@ -30,6 +30,7 @@ from cartctl.solvers.exact.working_set import (
     FREE,
     KIND,
     LAM,
+    NEARLY,
     NUM,
     SUM,
     G,
@@ -151,7 +152,10 @@ def _touches(w: WorkingSet, side: float, u: FloatArray, s: float, blur: float) -
             settled = False
     round_off = _TOUCHED * size if settled else min(_SUMMED * total, _TOUCHED * size)
     magnified = max(blur * abs(follows), _SURELY * _EPS * total)
-    return missing <= max(round_off, min(magnified, _BLURRED * size))
+    touches = missing <= max(round_off, min(magnified, _BLURRED * size))
+    if touches and missing > _SUMMED * size:
+        w.K[NEARLY, 0] = 1
+    return touches
 
 
 @part

@@ -22,9 +22,12 @@ from cartctl.solvers.exact.line_search import blocked_at, lowest_at
 from cartctl.solvers.exact.proof import write_multipliers
 from cartctl.solvers.exact.scaled import MET
 from cartctl.solvers.exact.working_set import (
+    EXACT,
     FREE,
     KIND,
     LAM,
+    NEAR,
+    NEARLY,
     NUM,
     SUM,
     WHO,
@@ -33,11 +36,13 @@ from cartctl.solvers.exact.working_set import (
     Z,
     combine,
     largest_entry,
+    length,
     orthogonalise,
     unsure,
 )
 
 _NOISE = 2e-8  # of the rows' size: singular values below this lead nowhere
+_GAIN, _OFTEN = 1e-14, 6  # of the sum: so many steps one after another that lower it by less lead nowhere
 _REST = 1e-11  # of the largest miss: a step that changes the rows by less is none
 _ROUND_OFF = 1e-14  # of the rows' size times that of u: rows that move or miss by less do not
 _NOTHING = 1e-12  # of what is added up in a row, or may have been: a miss below this is none
@@ -67,19 +72,23 @@ def fitted_level(
     stays = np.zeros(q.state.shape[0], np.bool_)  # let go once and met again at once: its multiplier is round-off
     gone, lost = np.empty(1, np.int64), False
     gone[0] = -1
+    before, unblocked, in_vain = np.inf, False, 0
     for turn in range(most):
         count = _misses(rows, low, high, u, miss)
+        total = length(miss, m) ** 2
+        in_vain = in_vain + 1 if unblocked and total >= (1.0 - _GAIN) * before else 0
         rank = _step(w, rows, miss, count, size, p)
         if turn == 0:
             lost = rank < min(m, n - w.K[NUM, 0])
         largest = _largest(rows, u, float(q.norm[q.state.shape[0]]), miss)
         round_off = _ROUND_OFF * size * largest_entry(u)
-        if _moves(rows, p, largest, round_off):
+        if in_vain < _OFTEN and _moves(rows, p, largest, round_off):
             most_far, code = blocked_at(q, u, p)
             far = lowest_at(rows, low, high, u, p, most_far)
             for k in range(n):
                 u[k] += far * p[k]
-            if far >= most_far and code >= 0:
+            before, unblocked = total, far < most_far or code < 0
+            if not unblocked:
                 left = normal_of(q, code, w)
                 take_in(q, w, code, left, 0.0)
                 stays[code >> 1] |= code == gone[0]
@@ -96,7 +105,7 @@ def fitted_level(
             write_multipliers(w, q, norm, proof)
             _keep_sure(w, _SURE * size * (round_off + size * unsure(w, u)))
             return MET, lost
-        gone[0] = w.K[WHO, weakest]
+        gone[0], unblocked = w.K[WHO, weakest], False
         drop(q, w, weakest)
         look_again(q, w)
     return STALLED, lost
@@ -143,6 +152,8 @@ def _step(w: WorkingSet, rows: FloatArray, miss: FloatArray, count: int, size: f
     U, s, Vt = np.linalg.svd(B, full_matrices=False)
     rank = 0
     for j in range(s.shape[0]):
+        if EXACT * size < s[j] < NEAR * size:
+            w.K[NEARLY, 0] = 1
         if s[j] <= _NOISE * size:
             break
         rank += 1

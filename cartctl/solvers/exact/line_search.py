@@ -9,7 +9,7 @@ from cartctl.kernels import part
 from cartctl.solvers.exact.inequalities import OUT, Inequalities
 from cartctl.solvers.exact.working_set import largest_entry
 
-_ROUND_OFF = 1e-13  # of the terms of a row's rate
+_ROUND_OFF = 1e-13  # of what a row's rate could be: entries of a step are no surer than its largest
 _ALONG = 1e-12  # of the step: a component this small does not approach an inequality
 
 
@@ -42,13 +42,13 @@ def lowest_at(rows: FloatArray, low: FloatArray, high: FloatArray, u: FloatArray
     """Where the sum of squared misses is least along u + far p, far in [0, most]."""
     m, n = rows.shape
     start, rate = np.zeros(m), np.zeros(m)
-    pieces = False
+    longest, pieces = largest_entry(p), False
     for i in range(m):
         terms = 0.0
         for k in range(n):
             start[i] += rows[i, k] * u[k]
             rate[i] += rows[i, k] * p[k]
-            terms += abs(rows[i, k] * p[k])
+            terms += abs(rows[i, k]) * longest
         if abs(rate[i]) <= _ROUND_OFF * terms:
             rate[i] = 0.0  # or a row that cannot move would decide over steps of any length
         pieces = pieces or low[i] != high[i]

@@ -39,6 +39,7 @@ _ROUND_OFF = 1e-12  # of s, or of the size of u
 _BLUR = 2e-15  # of the largest term of a row that pins s: its round-off
 _BLURRED = 1e-6  # s is never less sure than this
 _SAME = 1e-8  # relative: sides that differ by less agree
+_GRAIN = 10.0  # times round-off: what is left of a sum may be due to it
 _NEGLECTED = 3.0  # times what is neglected of a row: or by less than this
 
 
@@ -146,24 +147,28 @@ def add_rows(
             norm = size if size > 0.0 else 1.0
             e.norm[i] = norm  # a row of zeros is as large as its task
         lost = True
-        same = max(_SAME, _NEGLECTED * part_of * neglected)
+        same, grain = max(_SAME, _NEGLECTED * part_of * neglected), _GRAIN * (_BLUR + noise(w))
         at, bt = -e.base[i] / norm, e.slope[i] / norm
-        at_size, bt_size = abs(at), max(abs(bt), largest / norm)
+        own_at, own_bt = abs(at), max(abs(bt), largest / norm)
+        at_size, bt_size = own_at, own_bt  # with what nearly dependent members magnify, which is no surer than they are
         for j in range(w.K[NUM, 0]):
             at += w.V[SUM, j] * w.V[C0, j]
             bt -= w.V[SUM, j] * w.V[C1, j]
-            at_size = max(at_size, abs(w.V[SUM, j] * w.V[C0, j]), part_of * abs(w.V[G, j]))
+            own_at = max(own_at, part_of * abs(w.V[G, j]))
+            at_size = max(at_size, own_at, abs(w.V[SUM, j] * w.V[C0, j]))
             bt_size = max(bt_size, abs(w.V[SUM, j] * w.V[C1, j]))
-        if abs(bt) <= same * bt_size:
-            if abs(at) <= max(same * max(at_size, bt_size), _ROUND_OFF * q.norm[q.state.shape[0]]):
+        no_bt = max(same * own_bt, min(grain, same) * bt_size)
+        no_at = max(same * max(own_at, own_bt), min(grain, same) * max(at_size, bt_size))
+        if abs(bt) <= no_bt:
+            if abs(at) <= max(no_at, _ROUND_OFF * q.norm[q.state.shape[0]]):
                 continue
             _prove_row(w, q, e, i, pin, at, bt, proof)
             return False, math.nan, 0.0, pin, lost
         pinned = at / bt
         unsure = min((_BLUR + noise(w) + part_of * neglected) * max(at_size, bt_size) / abs(bt), _BLURRED)
-        if pinned < 0.0 and abs(at) <= same * at_size:
+        if pinned < 0.0 and abs(at) <= no_at:
             pinned = 0.0
-        elif pinned > 1.0 and abs(at - bt) <= same * max(at_size, bt_size):
+        elif pinned > 1.0 and abs(at - bt) <= no_at:
             pinned = 1.0
         outside = max(-pinned, pinned - 1.0) > END + unsure
         if outside or (pin != NOBODY and abs(pinned - s) > same + unsure + blur):

@@ -19,6 +19,7 @@ from cartctl.kernels import part
 FIXED, FREE, TIED = 0, 1, 2  # an equality; an inequality that may leave; one that the present scale depends on
 
 _EPS = 2.0**-52
+EXACT, NEAR = 1e-13, 1e-4  # of a norm: what is left between these is nearly dependent
 _CANCELLED = 0.3  # of a norm left after one pass: below, a second pass restores orthogonality
 
 
@@ -33,6 +34,7 @@ ERR = 8  # by how much round-off may have turned a row of Q
 # Rows of K.
 WHO, KIND = 0, 1  # an inequality's code or -1 - row of an equation; FIXED, FREE or TIED
 NUM = 2  # its first entry: how many members there are
+NEARLY = 3  # its first entry: whether anything was nearly dependent on the members
 
 
 class WorkingSet(NamedTuple):
@@ -41,14 +43,14 @@ class WorkingSet(NamedTuple):
     Q: FloatArray  # (n + 1, n)
     R: FloatArray  # (n + 1, n + 1)
     V: FloatArray  # (9, n + 1)
-    K: NDArray[np.int64]  # (3, n + 1)
+    K: NDArray[np.int64]  # (4, n + 1)
 
 
 @part
 def new_working_set(n: int) -> WorkingSet:
     """An empty one in R^n."""
     return WorkingSet(
-        np.empty((n + 1, n)), np.empty((n + 1, n + 1)), np.zeros((9, n + 1)), np.zeros((3, n + 1), np.int64)
+        np.empty((n + 1, n)), np.empty((n + 1, n + 1)), np.zeros((9, n + 1)), np.zeros((4, n + 1), np.int64)
     )
 
 
@@ -71,6 +73,8 @@ def orthogonalise(w: WorkingSet, norm: float) -> float:
         left = length(z, n)
         if left >= _CANCELLED * norm:
             break
+    if EXACT * norm < left < NEAR * norm:
+        w.K[NEARLY, 0] = 1
     return left
 
 
