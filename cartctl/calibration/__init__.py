@@ -1,11 +1,13 @@
 """Kinematic calibration: from measurements to a better robot model. ``from cartctl import calibration``.
 
 ``cc.DHChain`` (a Denavit-Hartenberg table) and ``RobotChain`` (any URDF) say what can be estimated, ``cc.calibrate``
-estimates it, the ``cc.Calibration`` says how sure it is. ``link_lengths`` is the linear case, ``choose_configurations``
+estimates it, the ``cc.Calibration`` says how sure it is. ``aligned`` finds where
+the robot stands in a device's frame, ``link_lengths`` is the linear case, ``choose_configurations``
 says where to measure, ``cross_validate`` whether the result predicts, ``read_table`` reads measurements from CSV,
 ``symbolic_regressor`` prints the formulas of small tables (SymPy, the extra ``symbolic``).
 """
 
+from cartctl.calibration.alignment import aligned
 from cartctl.calibration.calibrate import calibrate
 from cartctl.calibration.chain import Chain
 from cartctl.calibration.design import Choice, choose_configurations
@@ -32,6 +34,7 @@ __all__ = [
     "Outcome",
     "RobotChain",
     "SymbolicRegressor",
+    "aligned",
     "calibrate",
     "choose_configurations",
     "cross_validate",

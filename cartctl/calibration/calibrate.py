@@ -46,7 +46,9 @@ def calibrate(
     None for the whole table, or all placements. noise: standard deviation in m, for poses (m, rad), None to
     estimate it. loss: "linear", "huber", "cauchy" or "tukey", the last three for data with outliers. agreement: m and
     rad; where no residual is larger, nothing is changed. rank_tolerance: singular values of the column-scaled regressor
-    below this share of the largest count as zero; such directions stay nominal and are reported.
+    below this share of the largest count as zero at the nominal parameters; such directions stay nominal and are
+    reported. Where the estimate makes more of them visible (parallel axes that tilt), ``result.rank_after`` is larger
+    than ``rank``: calibrating ``result.chain`` again estimates them, too, as weakly as they are seen.
 
     Raises ShapeError, NonFiniteError, ParameterError, ParameterNotFound, UnsupportedJoint, FrameNotFound. Source: De
     Luca, Robotics 2 (calibration); Khalil & Dombre 2002, ch. 11; Hollerbach, Khalil & Gautier 2008.
@@ -67,6 +69,8 @@ def calibrate(
     problem = Problem(chain.product, angles, data, chosen, seen, noise_model.given(noise, data), loss)
     fit = solve(problem, steps, agreement)
     delta = seen.basis @ fit.z
+    poses, Phi = chain.product.regressor(angles, chosen, problem.spread(fit.z))
+    after = data.derivative(poses, Phi, fit.residuals)
     return Calibration(
         chain=chain.changed(dict(zip(names, delta.tolist(), strict=True))),
         nominal=chain,
@@ -81,6 +85,7 @@ def calibrate(
         fit=fit,
         seen=seen,
         noise_known=noise is not None,
+        rank_after=identify(after.reshape(-1, len(names)), names, tolerance).rank,
     )
 
 

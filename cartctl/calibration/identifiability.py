@@ -42,7 +42,8 @@ class Indistinct:
 class Identifiability:
     """basis: (p, r), the changes D V_r that are seen, in m and rad. scale: (p,) D. values: (p,) sigma, descending.
 
-    seen: (p,) which parameters are determined by themselves. unidentifiable: the directions that are not.
+    seen: (p,) which parameters are determined by themselves. unidentifiable: the directions that are not. independent:
+    r parameters that the data tell apart once the others are fixed.
     """
 
     basis: FloatArray
@@ -50,6 +51,7 @@ class Identifiability:
     values: FloatArray
     seen: np.ndarray
     unidentifiable: tuple[Indistinct, ...]
+    independent: tuple[str, ...]
 
     @property
     def rank(self) -> int:
@@ -76,20 +78,24 @@ def identify(H: FloatArray, names: Sequence[str], tolerance: float) -> Identifia
     rank = int((values > tolerance * values[0]).sum()) if p and values[0] > 0.0 else 0
     null = Vt[rank:].T
     seen = np.linalg.norm(null, axis=1) <= _SHARE if null.size else np.ones(p, dtype=bool)
+    found, pivots = _relations(null, scale, names)
     return Identifiability(
         basis=scale[:, None] * Vt[:rank].T,
         scale=scale,
         values=values,
         seen=seen,
-        unidentifiable=_relations(null, scale, names),
+        unidentifiable=tuple(Indistinct(*one) for one in found),
+        independent=tuple(name for i, name in enumerate(names) if i not in pivots),
     )
 
 
-def _relations(null: FloatArray, scale: FloatArray, names: Sequence[str]) -> tuple[Indistinct, ...]:
-    """The null space (p, k) as k directions, each with a parameter of its own and few others."""
+def _relations(
+    null: FloatArray, scale: FloatArray, names: Sequence[str]
+) -> tuple[list[tuple[tuple[str, ...], tuple[float, ...]]], set[int]]:
+    """The null space (p, k) as k directions, each with a parameter of its own and few others; and these parameters."""
     k = null.shape[1]
     if not k:
-        return ()
+        return [], set()
     pivots = qr(null.T, mode="r", pivoting=True)[1][:k]
     reduced = lu_solve(lu_factor(null[pivots].T), null.T).T  # the pivots' rows become unit vectors
     found = []
@@ -97,5 +103,5 @@ def _relations(null: FloatArray, scale: FloatArray, names: Sequence[str]) -> tup
         part = np.flatnonzero(np.abs(column) > _SHARE * np.abs(column).max())
         change = column[part] * scale[part]
         change = change / change[np.argmax(np.abs(change))]
-        found.append(Indistinct(tuple(names[int(i)] for i in part), tuple(float(x) for x in change)))
-    return tuple(sorted(found, key=lambda one: (len(one.parameters), one.parameters)))
+        found.append((tuple(names[int(i)] for i in part), tuple(float(x) for x in change)))
+    return sorted(found, key=lambda one: (len(one[0]), one[0])), {int(i) for i in pivots}

@@ -40,7 +40,8 @@ class Calibration:
     "m" or "rad" each. delta: (p,) estimate minus nominal. rank: r <= p, how many combinations of them are seen.
     condition: of the column-scaled regressor on these. unidentifiable: the directions that no measurement sees, along
     which the parameters stay nominal (least change of the column-scaled ones); determined: (p,) bool, which parameters
-    have no part in any. noise: standard deviations, one a unit, given or estimated. weights: (N,) of the loss.
+    have no part in any. rank_after: the rank at the estimate; if larger than rank, the nominal chain hid something.
+    noise: standard deviations, one a unit, given or estimated. weights: (N,) of the loss.
     outliers: numbers of the measurements farther off than 1 in 10,000 sound ones. outcome: how it ended.
     """
 
@@ -57,6 +58,7 @@ class Calibration:
     fit: Fit
     seen: Identifiability
     noise_known: bool
+    rank_after: int
 
     @property
     def rank(self) -> int:
@@ -72,6 +74,11 @@ class Calibration:
     def unidentifiable(self) -> tuple[Indistinct, ...]:
         """Which parameters cannot be told apart, and how they may change together unseen."""
         return self.seen.unidentifiable
+
+    @property
+    def independent(self) -> tuple[str, ...]:
+        """As many parameters as the rank, which the data tell apart: ``parameters=result.independent`` fits as well."""
+        return self.seen.independent
 
     @property
     def determined(self) -> Any:
@@ -185,10 +192,16 @@ class Calibration:
         """Whether ``delta`` (p,) lies in the joint confidence ellipsoid over what is identifiable."""
         return self.distance(delta) <= self.radius(level)
 
-    def errors(self, after: bool = True) -> tuple[Errors, ...]:
-        """Norms of the residuals with the estimate, or with the nominal values, one entry a unit."""
+    def errors(self, after: bool = True, outliers: bool = True) -> tuple[Errors, ...]:
+        """Norms of the residuals with the estimate, or with the nominal values, one entry a unit.
+
+        outliers=False leaves these out.
+        """
         e = self.residuals if after else self.before
-        return errors_of(self.data, e)
+        kept = np.ones(len(e), dtype=bool)
+        if not outliers and len(self.outliers) < len(e):
+            kept[self.outliers] = False
+        return errors_of(self.data, e[kept])
 
     def table(self) -> list[tuple[str, str, float, float, float]]:
         """Name, unit, nominal value, estimate and standard deviation of every parameter; corrections start at 0."""
@@ -205,10 +218,13 @@ class Calibration:
                 f"RMS {old.rms:.4g} -> {new.rms:.4g} {old.unit}, largest {old.largest:.4g} -> {new.largest:.4g}"
             )
         if len(self.outliers):
-            more = ", ..." if len(self.outliers) > 12 else ""
-            numbers = ", ".join(map(str, self.outliers[:12])) + more
+            rest = ", ..." if len(self.outliers) > 12 else ""
+            numbers = ", ".join(map(str, self.outliers[:12])) + rest
             lines.append(f"outliers: {len(self.outliers)} of {len(self.data)}, measurements {numbers} (from 0)")
         lines += [str(one) for one in self.unidentifiable]
+        if self.rank_after > self.rank:
+            more = self.rank_after - self.rank
+            lines.append(f"at the estimate {more} more would be seen, weakly: calibrate its chain again to use them")
         return "\n".join(lines)
 
     def urdf(self) -> str:
@@ -251,6 +267,7 @@ class Calibration:
             "outcome": self.outcome.name,
             "iterations": self.iterations,
             "rank": self.rank,
+            "rank_after": self.rank_after,
             "condition": self.condition,
             "noise": self.noise,
             "noise_given": self.noise_known,
@@ -259,6 +276,7 @@ class Calibration:
             "outliers": self.outliers.tolist(),
             "parameters": parameters,
             "covariance": covariance.tolist() if np.isfinite(covariance).all() else None,
+            "independent": list(self.independent),
             "unidentifiable": [dict(zip(one.parameters, one.direction, strict=True)) for one in self.unidentifiable],
             **{end: getattr(self.chain, end).tolist() for end in ("base", "tool")},
         }

@@ -70,6 +70,28 @@ def robot_urdf(chain: RobotChain) -> str:
     return _text(root)
 
 
+def tool_link(chain: RobotChain) -> str:
+    """The link of :func:`robot_urdf` that is the chain's end."""
+    if chain.source.spec is None:
+        return "tool"
+    return chain.frame if np.array_equal(chain.tool, np.eye(4)) else TOOL
+
+
+def mesh_folders(chain: RobotChain) -> list[Path]:
+    """The folders that :func:`cartctl.load` wants as package_dirs to find the meshes of :func:`robot_urdf`."""
+    spec = chain.source.spec
+    if spec is None or "lengths" in spec:
+        return []
+    given = [Path(folder) for folder in spec["package_dirs"]]
+    path = Path(spec["source"])
+    if path.is_absolute():
+        return [*given, path.parent]
+    entry = find(spec["source"])
+    home = entry.urdf_path()
+    own = [] if home is None or entry.package_dirs() else [home.parent]
+    return [*given, *entry.package_dirs(), *own]
+
+
 def _own_text(chain: RobotChain) -> str | bytes | None:
     """The URDF the robot was loaded from, None for a Pinocchio model of the user's own."""
     spec = chain.source.spec
