@@ -77,7 +77,8 @@ def rows() -> list[dict[str, str]]:
         found.append({
             "what": f"{label}: {kind}", "measurements": str(count), "parameters": str(len(result.names)),
             "rank": str(result.rank), "steps": str(result.iterations), "seconds": f"{seconds:.3f}",
-            "ratio_to_one_QR": f"{seconds / lapack:.1f}", "rms_before_mm": f"{1e3 * result.errors(after=False)[0].rms:.3f}",
+            "ratio_to_one_QR": f"{seconds / lapack:.1f}",
+            "rms_before_mm": f"{1e3 * result.errors(after=False)[0].rms:.3f}",
             "rms_after_mm": f"{1e3 * result.errors(outliers=False)[0].rms:.3f}", "outliers": str(len(result.outliers)),
         })  # fmt: skip
     return found

@@ -13,6 +13,7 @@ from scipy.stats import chi2, f, t
 import cartctl as cc
 from cartctl import calibration as cal
 from cartctl.calibration import Outcome, robust
+from cartctl.calibration.tall import tall_r
 from cartctl.dynamics.expressions import number
 from cartctl.errors import NonFiniteError, ParameterError, ParameterNotFound, ShapeError
 from tests.calibration_for_tests import HALF, TOOL, hayati, lwr, measure, panda, planted, puma, scara, spread
@@ -32,6 +33,7 @@ def in_its_own_gauge(chain, measured, parameters, **options):
 # --- recovery ---------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("noise", [None, (1e-4, 2e-4)], ids=["estimated", "given"])
 def test_the_pandas_errors_lie_in_the_joint_ellipsoid(noise):
     """1 mm and 0.5 deg planted in the 28 entries of the table, 40 noisy poses, 200 seeded trials: all identifiable."""
@@ -45,6 +47,7 @@ def test_the_pandas_errors_lie_in_the_joint_ellipsoid(noise):
     assert inside >= COVERED * TRIALS
 
 
+@pytest.mark.slow
 def test_with_base_and_tool_they_do_over_what_is_identifiable():
     """40 parameters of which 34 are: 4 for each of seven revolute joints and 6 (Everett, Driels & Mooring 1987).
 
@@ -589,3 +592,11 @@ def test_singular_data_give_numbers_all_the_same():
     assert found.rank == 3 and np.isfinite(found.delta).all() and np.abs(found.delta).max() < 0.01
     assert np.isfinite(found.covariance).all() and not np.isnan(found.interval()).any()
     assert HALF > np.abs(found.chain.theta).max()
+
+
+@pytest.mark.parametrize(("m", "n"), [(5000, 7), (1000, 30), (40, 3), (3, 5), (768, 4), (769, 4), (0, 3), (7, 0)])
+def test_the_r_of_tall_matrices(m, n):
+    A = np.random.default_rng(m + n).normal(size=(m, n))
+    R = tall_r(A)
+    assert len(R) <= n and np.allclose(np.tril(R, -1), 0.0)
+    np.testing.assert_allclose(R.T @ R, A.T @ A, atol=1e-12 * max(m, 1))

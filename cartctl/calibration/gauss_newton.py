@@ -19,6 +19,7 @@ from cartctl.calibration import noise, robust
 from cartctl.calibration.identifiability import Identifiability
 from cartctl.calibration.measurements import Measurements
 from cartctl.calibration.motions import Product
+from cartctl.calibration.tall import tall_r
 from cartctl.checks import FloatArray, IntArray
 
 STILL = 1e-5  # standard errors: a smaller step changes nothing that the data could tell
@@ -144,7 +145,7 @@ class _Factor:
 
     def __init__(self, J: FloatArray, b: FloatArray) -> None:
         r = J.shape[1]
-        R: FloatArray = np.asarray(np.linalg.qr(np.column_stack([J, b]), mode="r"))
+        R = tall_r(np.column_stack([J, b]))
         U, self.s, self.Vt = np.linalg.svd(R[:r, :r], full_matrices=False)
         self.g = U.T @ R[:r, r]
         self.kept = self.s > 1e-12 * self.s[0]
@@ -177,7 +178,7 @@ def _finished(
     e, J = linear
     norms = np.linalg.norm(_white(problem, e, sigma), axis=1)
     A, _ = _whitened(problem, J, e, sigma, np.ones(len(e)))
-    R = np.asarray(np.linalg.qr(A, mode="r")) if A.shape[1] else np.zeros((0, 0))
+    R = tall_r(A)
     w = robust.weights(problem.loss, norms, problem.data.rows)
     inflation = robust.inflation(problem.loss, norms, problem.data.rows, len(z))
     return Fit(z, e, sigma, w, R, inflation, norms, freedom, done, outcome)

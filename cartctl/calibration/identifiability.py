@@ -16,6 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import lu_factor, lu_solve, qr
 
+from cartctl.calibration.tall import tall_r
 from cartctl.checks import FloatArray
 
 _SHARE = 1e-6  # of a null direction's largest entry, below which a parameter has no part in it
@@ -71,7 +72,7 @@ def identify(H: FloatArray, names: Sequence[str], tolerance: float) -> Identifia
     active = norms > 1e-12 * norms.max(initial=0.0)
     scale = np.where(active, 1.0 / np.where(active, norms, 1.0), 1.0)
     p = H.shape[1]
-    R = np.asarray(np.linalg.qr(np.where(active, H * scale, 0.0), mode="r"))
+    R = tall_r(np.where(active, H * scale, 0.0))
     _, sigma, Vt = np.linalg.svd(R, full_matrices=True)
     values = np.zeros(p)
     values[: len(sigma)] = sigma

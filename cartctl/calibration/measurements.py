@@ -20,7 +20,6 @@ from cartctl import checks
 from cartctl.calibration.motions import Poses
 from cartctl.checks import FloatArray
 from cartctl.errors import ParameterError, ShapeError
-from cartctl.spatial.pose_error import pose_error
 
 KINDS = ("pose", "position", "distance")
 _ROTATION = 1e-4  # how far a measured rotation may be from one; it is then made one
@@ -72,11 +71,8 @@ class Measurements:
             return self.position - poses.position
         if self.kind == "distance":
             return np.asarray((self.length - np.linalg.norm(poses.position - self.anchor, axis=1))[:, None])
-        e = np.empty((len(self), 6))
-        measured = zip(poses.position, poses.rotation, self.position, self.rotation, e, strict=True)
-        for p, R, p_m, R_m, row in measured:
-            pose_error(p, R, p_m, R_m, row)
-        return e
+        turn = Rotation.from_matrix(self.rotation @ np.swapaxes(poses.rotation, 1, 2)).as_rotvec()
+        return np.concatenate([self.position - poses.position, turn], axis=1)
 
     def derivative(self, poses: Poses, Phi: FloatArray, residuals: FloatArray) -> FloatArray:
         """``H`` (N, rows, p), how the computed values change."""

@@ -27,7 +27,7 @@ def given(noise: Any, data: Measurements) -> FloatArray | None:
     if noise is None:
         return None
     count = len(data.parts)
-    if np.ndim(noise) == 0 and count == 2:
+    if count == 2 and np.size(noise) == 1:
         raise ParameterError(f"noise is {noise!r}; expected (m, rad) for poses, two standard deviations")
     sigma = checks.vector("noise", np.atleast_1d(noise), count)
     if (sigma <= 0.0).any():

@@ -16,6 +16,7 @@ import re
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
+from difflib import get_close_matches
 from pathlib import Path
 
 import numpy as np
@@ -112,7 +113,8 @@ def _header(top: str, cells: Sequence[str], robot: Robot) -> tuple[list[str], li
         wanted = _wanted(name, robot)
         if wanted is None:
             known = [*robot.single_joints, *POSITION, *QUATERNION, "distance", *ANCHOR]
-            raise MeasurementError(f"{where}: unknown name {name!r}; expected one of {', '.join(known)}")
+            offer = get_close_matches(name, known, n=3, cutoff=0.6) or [*known[:6], "..."] * (len(known) > 20) or known
+            raise MeasurementError(f"{where}: unknown name {name!r}; expected one of {', '.join(offer)}")
         if name in names:
             raise MeasurementError(f"{where}: {name!r} stands there twice; expected each column once")
         factor, dimension = _UNITS.get(wanted if unit is None else unit, (1.0, "")) if wanted else (1.0, "")

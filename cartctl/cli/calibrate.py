@@ -72,8 +72,8 @@ def calibrate(
     sigma = _numbers(noise)
     with busy(f"loading {robot}"):
         machine = cc.load(robot, package_dirs=package_dir or ())
-        table = calibration.read_table(measurements, machine, frame)
         chain = calibration.RobotChain(machine, frame)
+        table = calibration.read_table(measurements, machine, frame)
     if align:
         chain = calibration.aligned(chain, table.q, table.values, kind=table.kind)  # type: ignore[assignment]
         parameters += " base"
