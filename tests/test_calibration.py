@@ -600,3 +600,84 @@ def test_the_r_of_tall_matrices(m, n):
     R = tall_r(A)
     assert len(R) <= n and np.allclose(np.tril(R, -1), 0.0)
     np.testing.assert_allclose(R.T @ R, A.T @ A, atol=1e-12 * max(m, 1))
+
+
+@pytest.mark.parametrize("seed", range(150))
+def test_whatever_the_data_no_nan_leaves(seed):
+    """Random small tables, degenerate ones too, few and contradictory measurements, every kind and loss."""
+    rng = np.random.default_rng(seed)
+    n, count = int(rng.integers(1, 5)), int(rng.integers(1, 9))
+    columns = [rng.choice([0.0, 0.0, 0.5, 1.0, -HALF, HALF, rng.normal()], n) for _ in range(4)]
+    chain = cc.DHChain(*columns, "".join(rng.choice(list("RRRP"), n)), str(rng.choice(["standard", "modified"])))
+    q = rng.normal(size=(count, n)) * rng.choice([0.0, 1.0, 5.0])
+    poses = chain.changed({name: 1e-2 * rng.normal() for name in chain.names}).poses(q)
+    kind = str(rng.choice(["pose", "position", "distance"]))
+    values = {"pose": poses, "position": poses[:, :3, 3], "distance": np.linalg.norm(poses[:, :3, 3], axis=1)}[kind]
+    if kind != "pose":
+        values = np.abs(values + rng.choice([0.0, 1e-3, 10.0]) * rng.normal(size=values.shape))
+    parameters = str(rng.choice(["table", "table base tool", "a", "theta", "tool", "base d"]))
+    noise = None if rng.random() < 0.6 else (1e-3, 1e-3) if kind == "pose" else 1e-3
+    with np.errstate(all="raise", under="ignore"):
+        found = cc.calibrate(chain, q, values, parameters=parameters, loss=str(rng.choice(robust.LOSSES)), noise=noise)
+    assert found.kind == kind  # from the shape alone
+    for array in (
+        found.covariance,
+        found.deviations,
+        found.interval(),
+        found.weights,
+        found.radius(),
+        found.distance(found.delta),
+    ):
+        assert not np.isnan(array).any()
+    assert np.isfinite(found.delta).all() and np.isfinite(found.residuals).all()
+    assert "NaN" not in found.to_json() and "nan" not in found.urdf() and found.summary()
+
+
+def test_a_device_anywhere_is_found_without_alignment_too():
+    """From errors of 2.6 m and 100 deg damped steps find the base by themselves."""
+    robot = cc.load("lwr")
+    base = np.array([[0, -1, 0, 1.0], [0.6, 0, -0.8, -2.0], [0.8, 0, 0.6, 0.5], [0, 0, 0, 1]])
+    data = measure(cal.RobotChain(robot, base=base), "placements", 0)
+    found = cc.calibrate(robot, data.q, data.poses, parameters="placements base")
+    assert found.outcome is Outcome.CONVERGED and found.errors(after=False)[0].rms > 2.0
+    np.testing.assert_allclose(found.chain.positions(data.q), data.exact[:, :3, 3], atol=5e-4)
+
+
+def test_locked_joints_are_part_of_the_placements(tmp_path):
+    """A Panda with two joints locked: five are calibrated; the file, loaded with the same two locked, is the result."""
+    active = [f"panda_joint{i}" for i in (1, 2, 4, 6, 7)]
+    robot = cc.load("panda", active_joints=active, home={"panda_joint3": 0.4, "panda_joint5": -0.7})
+    chain, rng = cal.RobotChain(robot), np.random.default_rng(21)
+    q = rng.uniform(-1.0, 1.0, (40, 5))
+    true = chain.changed(planted(chain, "placements offsets tool", rng))
+    found = cc.calibrate(robot, q, true.poses(q), parameters="placements tool")
+    assert [joint.name for joint in chain.joints] == active and found.errors()[0].rms < 1e-9
+    from cartctl.calibration.urdf import mesh_folders
+
+    path = found.write_urdf(tmp_path / "five.urdf")
+    loaded = cc.load(
+        path,
+        active_joints=active,
+        home={"panda_joint3": 0.4, "panda_joint5": -0.7},
+        package_dirs=mesh_folders(found.chain),
+    )
+    for row, T in zip(q, true.poses(q), strict=True):
+        np.testing.assert_allclose(loaded.state(row).placement("calibrated_tool").homogeneous, T, atol=1e-9)
+
+
+def test_a_joint_called_base_or_tool_is_not_the_base_or_the_tool(tmp_path):
+    from cartctl.model.planar import planar_urdf
+
+    path = tmp_path / "arm.urdf"
+    path.write_text(planar_urdf([0.5, 0.4]).replace('"joint1"', '"base"'))
+    path.write_text(
+        path.read_text().replace('<link name="base"', '<link name="root"').replace('link="base"', 'link="root"')
+    )
+    chain = cal.RobotChain(cc.load(path))
+    assert len(set(chain.names)) == len(chain.names) and "base_joint.x" in chain.names and "base.x" in chain.names
+    q = np.random.default_rng(0).uniform(-2, 2, (10, 2))
+    moved = chain.changed({"base_joint.x": 0.01})
+    np.testing.assert_allclose(moved.positions(q), chain.positions(q) + [0.01, 0, 0], atol=1e-15)
+    (tmp_path / "moved.urdf").write_text(moved.urdf())
+    loaded = cc.load(tmp_path / "moved.urdf", tool="tool")
+    np.testing.assert_allclose(loaded.state(q[0]).position("tool"), moved.positions(q)[0], atol=1e-14)

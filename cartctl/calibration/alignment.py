@@ -25,19 +25,27 @@ _FLAT = 1e-3  # of the largest spread: below it positions lie on a line, about w
 
 
 def aligned(
-    chain_or_robot: Any, q: Any, measurements: Any, *, kind: str = "pose", frame: str | None = None, tool: Any = None
+    chain_or_robot: Any,
+    q: Any,
+    measurements: Any,
+    *,
+    kind: str | None = None,
+    frame: str | None = None,
+    tool: Any = None,
 ) -> Chain:
     """The chain with the base that brings its positions closest to the measured ones; nothing else changes.
 
     For a measuring device whose frame is anywhere: calibrate the result with ``base`` among the parameters. kind:
-    "pose" or "position", of which the positions are used. Raises MeasurementError where they are fewer than 3 or lie on
-    a line; otherwise as :func:`cartctl.calibrate`.
+    "pose" or "position", by their shape if None; the positions are used. Raises MeasurementError where they are
+    fewer than 3 or lie on a line; otherwise as :func:`cartctl.calibrate`.
     """
     chain = as_chain(chain_or_robot, frame, None, tool)
     angles = chain.coordinates(q)
     data = read(kind, measurements, len(angles))
-    if kind == "distance":
-        raise MeasurementError("kind is 'distance'; expected 'pose' or 'position', as distances show no directions")
+    if data.kind == "distance":
+        raise MeasurementError(
+            "the measurements are distances; expected 'pose' or 'position', as distances show no directions"
+        )
     own = _with_base(chain, np.eye(4))
     T = _fitted(own.product.poses(angles).position, data.position)
     return _with_base(chain, T)

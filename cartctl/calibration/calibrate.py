@@ -23,7 +23,7 @@ def calibrate(
     measurements: Any,
     *,
     parameters: Parameters = None,
-    kind: str = "pose",
+    kind: str | None = None,
     frame: str | None = None,
     base: Any = None,
     tool: Any = None,
@@ -37,10 +37,10 @@ def calibrate(
     """Estimate kinematic parameters: ``min sum_i w_i |Sigma^-1 (r_i - f(q_i, x))|^2`` by iterated, damped Gauss-Newton.
 
     chain_or_robot: a DHChain, a RobotChain, or a Robot (or pin.Model), of which the chain to ``frame`` (its tool) is
-    taken. q: (N, n) rad or m, of a robot its configurations (N, nq). measurements, by ``kind``: "pose" (N, 4, 4),
-    pin.SE3 or (N, 7) x y z and a quaternion x y z w; "position" (N, 3) m; "distance" (N,) m from ``anchor``,
-    (3,) or (N, 3), by default the origin in which measurements are given. base, tool: for a robot, where it stands in
-    the measuring frame and what its frame carries, (4, 4) or pin.SE3; both can be parameters.
+    taken. q: (N, n) rad or m, of a robot its configurations (N, nq). measurements, by ``kind``, which None takes from
+    their shape: "pose" (N, 4, 4), pin.SE3 or (N, 7) x y z and a quaternion x y z w; "position" (N, 3) m; "distance"
+    (N,) m from ``anchor``, (3,) or (N, 3), by default the origin in which measurements are given. base, tool: for a
+    robot, where it stands in the measuring frame and what its frame carries, (4, 4) or pin.SE3; both can be parameters.
 
     parameters: names, groups or patterns (``"a d"``, ``["theta*", "tool"]``), or masks ``{"a": [True, False, ...]}``;
     None for the whole table, or all placements. noise: standard deviation in m, for poses (m, rad), None to
@@ -76,7 +76,7 @@ def calibrate(
         nominal=chain,
         names=names,
         units=chain.units(names),
-        kind=kind,
+        kind=data.kind,
         loss=loss,
         delta=delta,
         data=data,

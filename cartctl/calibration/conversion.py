@@ -15,6 +15,8 @@ from cartctl.dynamics.dh_model import serial_model
 from cartctl.errors import ParameterError, UnsupportedJoint
 from cartctl.model.robot import Robot
 
+RESERVED = ("base", "tool", "placements", "offsets")  # groups of parameters, not joints
+
 
 class PathJoint(NamedTuple):
     """A joint on the way to a frame. number: in the model. turns: or slides. axis: (3,) unit, in the joint's frame."""
@@ -23,6 +25,11 @@ class PathJoint(NamedTuple):
     number: int
     turns: bool
     axis: FloatArray
+
+    @property
+    def label(self) -> str:
+        """The joint's name, unless that is one of a group of parameters."""
+        return f"{self.name}_joint" if self.name in RESERVED else self.name
 
 
 def as_robot(value: Any) -> Robot:

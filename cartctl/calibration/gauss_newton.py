@@ -25,7 +25,8 @@ from cartctl.checks import FloatArray, IntArray
 STILL = 1e-5  # standard errors: a smaller step changes nothing that the data could tell
 _STEADY = 1e-3  # relative change of a standard deviation between steps
 _FIRST = 1e-4  # lambda of the first damped trial, times s_1^2
-_TRIALS = 12
+_TRIALS = 16
+_TURN, _SLIDE = 1.0, 10.0  # rad and m, of one step
 
 
 class Outcome(Enum):
@@ -33,7 +34,7 @@ class Outcome(Enum):
 
     AGREES = "the data agree with the nominal parameters already; nothing was changed"
     CONVERGED = "the last step was far below the standard errors"
-    STALLED = "no step lowers the residuals any further, damped or not; the nominal values may be far off"
+    STALLED = "no step lowers the residuals further; the nominal values may be far off (see aligned() for the base)"
     ITERATIONS = "not converged when the iterations ended; raise iterations="
     NOTHING_SEEN = "the measurements see none of these parameters; measure something else, or elsewhere"
 
@@ -61,6 +62,12 @@ class Problem(NamedTuple):
         poses, Phi = self.product.regressor(self.q, self.chosen, self.spread(z))
         e = self.data.residuals(poses)
         return e, self.data.derivative(poses, Phi, e) @ self.seen.basis
+
+    def is_long(self, step: FloatArray) -> bool:
+        """Whether a step (r,) goes farther than a derivative can tell."""
+        change = np.abs(self.spread(step))
+        angles = self.product.angles
+        return bool(change[angles].max(initial=0.0) > _TURN or change[~angles].max(initial=0.0) > _SLIDE)
 
     def spread(self, z: FloatArray) -> FloatArray:
         """All parameters of the product, those not chosen at 0."""
@@ -131,7 +138,11 @@ def _descend(
     """The first of ever more damped steps that lowers the cost, and the damping to begin with next time."""
     cost = float(b @ b)
     for _ in range(_TRIALS):
-        trial = z + factor.step(damping)
+        step = factor.step(damping)
+        if problem.is_long(step):
+            damping = max(10.0 * damping, _FIRST)
+            continue
+        trial = z + step
         e = problem.residuals(trial)
         new = float((w * (_white(problem, e, sigma) ** 2).sum(axis=1)).sum())
         if np.isfinite(new) and new <= cost * (1.0 + 1e-12):

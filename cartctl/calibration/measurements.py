@@ -93,7 +93,7 @@ def read(kind: Any, values: Any, count: int, anchor: Any = None) -> Measurements
 
     Raises ParameterError, ShapeError, NonFiniteError.
     """
-    checks.choice("kind", kind, KINDS)
+    kind = _by_shape(values) if kind is None else checks.choice("kind", kind, KINDS)
     if anchor is not None and kind != "distance":
         raise ParameterError(f"anchor is given with kind={kind!r}; expected it with kind='distance' only")
     position, rotation = np.zeros((count, 3)), np.tile(np.eye(3), (count, 1, 1))
@@ -110,6 +110,16 @@ def read(kind: Any, values: Any, count: int, anchor: Any = None) -> Measurements
             fixed = checks.floats("anchor", anchor)
             anchors = _sound("anchor", np.tile(fixed, (count, 1)) if fixed.ndim == 1 else fixed, (count, 3))
     return Measurements(kind, position, rotation, length, anchors)
+
+
+def _by_shape(values: Any) -> str:
+    """(N,) numbers are distances, (N, 3) positions, all else should be poses."""
+    if not isinstance(values, np.ndarray):
+        items = checks.listed("measurements", values)
+        if any(hasattr(item, "homogeneous") for item in items):
+            return "pose"
+        values = checks.floats("measurements", items)
+    return "distance" if values.ndim == 1 else "position" if values.shape[1:] == (3,) else "pose"
 
 
 def _poses(values: Any, count: int) -> tuple[FloatArray, FloatArray]:

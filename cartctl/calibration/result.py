@@ -14,13 +14,12 @@ import numpy as np
 from scipy.special import betaincinv, stdtrit
 
 from cartctl import checks
-from cartctl.calibration import robust
+from cartctl.calibration import robust, written
 from cartctl.calibration.chain import Chain
 from cartctl.calibration.gauss_newton import Fit, Outcome
 from cartctl.calibration.identifiability import Identifiability, Indistinct
 from cartctl.calibration.measurements import Measurements
 from cartctl.checks import FloatArray, IntArray
-from cartctl.files import whole_file
 
 
 class Errors(NamedTuple):
@@ -131,7 +130,7 @@ class Calibration:
 
         inf throughout where there are no measurements to spare and the noise is not given.
         """
-        if not self.noise_known and self.spare <= 0:
+        if (not self.noise_known and self.spare <= 0) or not math.isfinite(self.fit.inflation):
             return np.full((len(self.names),) * 2, np.inf)
         root = self.seen.basis @ self._root() * math.sqrt(self.fit.inflation)
         return np.asarray(root @ root.T)
@@ -211,21 +210,7 @@ class Calibration:
 
     def summary(self) -> str:
         """The result in a few lines."""
-        lines = [f"{len(self.data)} {self.kind} measurements, {len(self.names)} parameters, rank {self.rank}"]
-        lines.append(f"{self.outcome} ({self.iterations} iterations)")
-        for old, new in zip(self.errors(after=False), self.errors(), strict=True):
-            lines.append(
-                f"RMS {old.rms:.4g} -> {new.rms:.4g} {old.unit}, largest {old.largest:.4g} -> {new.largest:.4g}"
-            )
-        if len(self.outliers):
-            rest = ", ..." if len(self.outliers) > 12 else ""
-            numbers = ", ".join(map(str, self.outliers[:12])) + rest
-            lines.append(f"outliers: {len(self.outliers)} of {len(self.data)}, measurements {numbers} (from 0)")
-        lines += [str(one) for one in self.unidentifiable]
-        if self.rank_after > self.rank:
-            more = self.rank_after - self.rank
-            lines.append(f"at the estimate {more} more would be seen, weakly: calibrate its chain again to use them")
-        return "\n".join(lines)
+        return written.summary(self)
 
     def urdf(self) -> str:
         """The calibrated chain as the text of a URDF; see :meth:`DHChain.urdf` and :meth:`RobotChain.urdf`."""
@@ -233,53 +218,15 @@ class Calibration:
 
     def write_urdf(self, path: str | os.PathLike[str]) -> Path:
         """Write :meth:`urdf` to a file, whole or not at all; raises ParameterError, FileError."""
-        return _write(path, self.urdf())
+        return written.save(path, self.urdf())
 
     def to_json(self) -> str:
         """Everything in numbers, as JSON; infinite deviations are null."""
-        return json.dumps(self._facts(), indent=1) + "\n"
+        return json.dumps(written.facts(self), indent=1) + "\n"
 
     def write_json(self, path: str | os.PathLike[str]) -> Path:
         """Write :meth:`to_json` to a file, whole or not at all; raises ParameterError, FileError."""
-        return _write(path, self.to_json())
-
-    def _facts(self) -> dict[str, Any]:
-        interval = self.interval()
-        parameters = [
-            {
-                "name": name,
-                "unit": unit,
-                "nominal": old,
-                "estimate": new,
-                "delta": float(self.delta[k]),
-                "deviation": _finite(s),
-                "interval95": [_finite(x) for x in interval[k]],
-                "determined": bool(self.determined[k]),
-            }
-            for k, (name, unit, old, new, s) in enumerate(self.table())
-        ]
-        covariance = self.covariance
-        return {
-            "chain": self.nominal.name,
-            "kind": self.kind,
-            "measurements": len(self.data),
-            "loss": self.loss,
-            "outcome": self.outcome.name,
-            "iterations": self.iterations,
-            "rank": self.rank,
-            "rank_after": self.rank_after,
-            "condition": self.condition,
-            "noise": self.noise,
-            "noise_given": self.noise_known,
-            "before": [dict(e._asdict()) for e in self.errors(after=False)],
-            "after": [dict(e._asdict()) for e in self.errors()],
-            "outliers": self.outliers.tolist(),
-            "parameters": parameters,
-            "covariance": covariance.tolist() if np.isfinite(covariance).all() else None,
-            "independent": list(self.independent),
-            "unidentifiable": [dict(zip(one.parameters, one.direction, strict=True)) for one in self.unidentifiable],
-            **{end: getattr(self.chain, end).tolist() for end in ("base", "tool")},
-        }
+        return written.save(path, self.to_json())
 
 
 def errors_of(data: Measurements, e: FloatArray) -> tuple[Errors, ...]:
@@ -289,13 +236,3 @@ def errors_of(data: Measurements, e: FloatArray) -> tuple[Errors, ...]:
         norm = np.linalg.norm(e[:, part], axis=1)
         found.append(Errors(unit, float(np.sqrt(np.mean(norm**2))), float(np.median(norm)), float(norm.max())))
     return tuple(found)
-
-
-def _finite(value: float) -> float | None:
-    return float(value) if math.isfinite(value) else None
-
-
-def _write(path: str | os.PathLike[str], text: str) -> Path:
-    with whole_file(path) as part:
-        part.write_text(text, encoding="utf-8", newline="\n")
-    return Path(path)

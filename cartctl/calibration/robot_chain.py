@@ -48,8 +48,8 @@ class RobotChain(Chain):
         steps: list[Step] = [*correctable("base", self.base)]
         for i, joint in enumerate(self.joints):
             place = self.source.model.jointPlacements[joint.number].homogeneous
-            steps += correctable(joint.name, place @ self.corrections.get(joint.name, np.eye(4)))
-            steps.append(Motion(joint.turns, joint.axis, name=f"{joint.name}.offset", joint=i))
+            steps += correctable(joint.label, place @ self.corrections.get(joint.name, np.eye(4)))
+            steps.append(Motion(joint.turns, joint.axis, name=f"{joint.label}.offset", joint=i))
         steps.append(Fixed(np.array(self._frame().placement.homogeneous)))
         return Product([*steps, *correctable("tool", self.tool)], len(self.joints))
 
@@ -59,11 +59,11 @@ class RobotChain(Chain):
     @property
     def groups(self) -> Mapping[str, Sequence[str]]:
         """One a joint, ``placements``, ``offsets``, ``base``, ``tool``."""
-        single = {joint.name: six_names(joint.name) for joint in self.joints}
+        single = {joint.label: six_names(joint.label) for joint in self.joints}
         return {
             **single,
             "placements": [name for six in single.values() for name in six],
-            "offsets": [f"{joint.name}.offset" for joint in self.joints],
+            "offsets": [f"{joint.label}.offset" for joint in self.joints],
             "base": six_names("base"),
             "tool": six_names("tool"),
         }
@@ -96,8 +96,8 @@ class RobotChain(Chain):
         )
         for joint in self.joints:
             before = self.corrections.get(joint.name, np.eye(4))
-            moved = corrected(before, [delta.get(n, 0.0) for n in six_names(joint.name)])
-            moved = moved @ placed(joint.turns, joint.axis, delta.get(f"{joint.name}.offset", 0.0))
+            moved = corrected(before, [delta.get(n, 0.0) for n in six_names(joint.label)])
+            moved = moved @ placed(joint.turns, joint.axis, delta.get(f"{joint.label}.offset", 0.0))
             if not np.array_equal(moved, np.eye(4)):
                 other.corrections[joint.name] = moved
         return other

@@ -50,7 +50,7 @@ def inflation(loss: str, norms: FloatArray, rows: int, rank: int) -> float:
     if bend < 1e-6 or h >= 1.0:
         return math.inf
     K = 1.0 + h * float(bends.var()) / (bend * bend)
-    return K * K * float(np.mean((w * norms) ** 2)) / rows / (bend * bend * (1.0 - h))
+    return max(1.0, K * K * float(np.mean((w * norms) ** 2)) / rows / (bend * bend * (1.0 - h)))
 
 
 def robust_scale(squares: FloatArray, rows: int) -> float:

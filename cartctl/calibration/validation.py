@@ -40,7 +40,7 @@ def cross_validate(
     frame: str | None = None,
     base: Any = None,
     tool: Any = None,
-    kind: str = "pose",
+    kind: str | None = None,
     anchor: Any = None,
     **options: Any,
 ) -> CrossValidation:
@@ -62,8 +62,8 @@ def cross_validate(
     for k in range(count):
         kept, left = np.flatnonzero(fold != k), np.flatnonzero(fold == k)
         part = data.part(kept)
-        anchors = part.anchor if kind == "distance" else None
-        found = calibrate(chain, q[kept], part.values, kind=kind, anchor=anchors, **options)
+        anchors = part.anchor if data.kind == "distance" else None
+        found = calibrate(chain, q[kept], part.values, kind=data.kind, anchor=anchors, **options)
         residuals[left] = data.part(left).residuals(found.chain.product.poses(angles[left]))
         results.append(found)
     before = data.residuals(chain.product.poses(angles))
