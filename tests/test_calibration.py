@@ -13,6 +13,7 @@ from scipy.stats import chi2, f, t
 import cartctl as cc
 from cartctl import calibration as cal
 from cartctl.calibration import Outcome, robust
+from cartctl.calibration.identifiability import identify
 from cartctl.calibration.tall import tall_r
 from cartctl.dynamics.expressions import number
 from cartctl.errors import NonFiniteError, ParameterError, ParameterNotFound, ShapeError
@@ -681,3 +682,23 @@ def test_a_joint_called_base_or_tool_is_not_the_base_or_the_tool(tmp_path):
     (tmp_path / "moved.urdf").write_text(moved.urdf())
     loaded = cc.load(tmp_path / "moved.urdf", tool="tool")
     np.testing.assert_allclose(loaded.state(q[0]).position("tool"), moved.positions(q)[0], atol=1e-14)
+
+
+def test_columns_are_scaled_before_they_are_compared():
+    """Rank, directions and independent ones do not depend on units: metres, millimetres or micrometres."""
+    rng = np.random.default_rng(22)
+    H = rng.normal(size=(60, 6))
+    H[:, 4] = 2.0 * H[:, 1] - H[:, 2]
+    H[:, 5] = 0.0
+    names = list("abcdef")
+    plain = identify(H, names, 1e-9)
+    units = np.array([1e-6, 1e3, 1.0, 1e9, 1e-3, 1.0])
+    scaled = identify(H * units, names, 1e-9)
+    assert plain.rank == scaled.rank == 4 and plain.independent == scaled.independent
+    assert plain.condition == pytest.approx(scaled.condition) and plain.condition < 100
+    assert [one.parameters for one in scaled.unidentifiable] == [("f",), ("b", "c", "e")]
+    for one in scaled.unidentifiable:
+        change = np.array([dict(zip(one.parameters, one.direction, strict=True)).get(name, 0.0) for name in names])
+        assert np.abs(H * units @ change).max() < 1e-9 * np.abs(H * units * change).max(initial=1e-9)
+    np.testing.assert_array_equal(scaled.seen, [True, False, False, True, False, False])
+    assert np.linalg.matrix_rank(scaled.basis / scaled.scale[:, None]) == 4
