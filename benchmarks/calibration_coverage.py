@@ -4,8 +4,8 @@
     python benchmarks/calibration_coverage.py --save     # and write benchmarks/results/calibration_coverage.csv
 
 The Panda's modified table, errors of up to 1 mm and 0.5 deg planted in every parameter, 40 poses with noise of 0.1 mm
-and 0.2 mrad. "own gauge": the planted errors expressed in the directions of the estimate, as noise-free data lead to them;
-"as planted": projected onto these directions, which is the same to first order only.
+and 0.2 mrad. "own gauge": the planted errors expressed in the directions of the estimate, as noise-free data lead to
+them; "as planted": projected onto these directions, which is the same to first order only.
 """
 
 from __future__ import annotations

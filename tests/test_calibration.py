@@ -584,6 +584,19 @@ def test_misuse_of_the_rest_is_named(call, error, words):
         call()
 
 
+def test_degrees_and_millimetres_are_suspected():
+    """A newcomer's first try: the summary says what it looks like, of q, of the table and of the measurements."""
+    data = measure(puma(), "theta", 23)
+    fine = cc.calibrate(puma(), data.q, data.poses, parameters="theta").summary()
+    assert "degrees" not in fine and "millimetres" not in fine
+    wrong = np.array(data.poses)
+    wrong[:, :3, 3] *= 1e3
+    found = cc.calibrate(puma(), np.degrees(data.q), wrong, parameters="theta").summary()
+    assert "q reaches" in found and "if these are millimetres" in found
+    table = cc.DHChain([0, 0.4], [90, 0], [0, 0])
+    assert "the table has an angle of 90 rad" in cc.calibrate(table, np.zeros((4, 2)), np.ones((4, 3))).summary()
+
+
 def test_singular_data_give_numbers_all_the_same():
     """All measurements at one stretched posture: most is not seen, nothing is nan, nothing flies off."""
     chain = cc.DHChain(a=[1, 1, 1], alpha=[0, 0, 0], d=[0, 0, 0])
@@ -692,7 +705,7 @@ def test_columns_are_scaled_before_they_are_compared():
     H[:, 5] = 0.0
     names = list("abcdef")
     plain = identify(H, names, 1e-9)
-    units = np.array([1e-6, 1e3, 1.0, 1e9, 1e-3, 1.0])
+    units = np.array([1e-6, 1e3, 1.0, 1e4, 1e-3, 1.0])
     scaled = identify(H * units, names, 1e-9)
     assert plain.rank == scaled.rank == 4 and plain.independent == scaled.independent
     assert plain.condition == pytest.approx(scaled.condition) and plain.condition < 100

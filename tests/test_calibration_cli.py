@@ -203,6 +203,8 @@ def test_old_files_survive_an_interruption(folder: Path, monkeypatch: pytest.Mon
         (("--robot", "lwr", "--noise", "1e-4"), "two standard deviations"),
         (("--robot", "lwr", "--loss", "l1"), "huber"),
         (("--robot", "lwr", "--frame", "hand"), "hand"),
+        (("--robot", "lwr", "--folds", "1"), "folds"),
+        (("--robot", "lwr", "--folds", "51"), "at most 50"),
         (("--robot", "panda"), "lwr_joint1"),
     ],
 )

@@ -22,6 +22,7 @@ from pathlib import Path
 import numpy as np
 
 from cartctl.calibration.conversion import joints_to
+from cartctl.calibration.written import FAR, WIDE
 from cartctl.checks import FloatArray
 from cartctl.errors import CartctlWarning, MeasurementError
 from cartctl.model.robot import Robot
@@ -29,9 +30,7 @@ from cartctl.model.robot import Robot
 POSITION, QUATERNION, ANCHOR = ("x", "y", "z"), ("qx", "qy", "qz", "qw"), ("ax", "ay", "az")
 _UNITS = {"rad": (1.0, "rad"), "deg": (math.pi / 180.0, "rad"), "m": (1.0, "m"), "mm": (1e-3, "m"), "cm": (1e-2, "m")}
 _HEAD = re.compile(r"^\s*(.*?)\s*(?:[\[(]\s*([^\])]*?)\s*[\])])?\s*$")
-_WIDE = 4.0 * math.pi  # rad: no joint turns farther, but degrees look like this
-_FAR = 50.0  # m: no arm reaches farther, but millimetres look like this
-_MOST = 1_000_000  # rows
+_MOST = 200_000  # rows
 
 
 @dataclass(frozen=True, eq=False)
@@ -178,11 +177,11 @@ def _numbers(path: str, rows: Sequence[tuple[int, list[str]]], header: Sequence[
 def _suspect(path: str, at: dict[str, FloatArray], needed: Sequence[str], robot: Robot) -> None:
     """Warn of what looks like another unit."""
     for name in needed:
-        if not robot.is_prismatic(name) and float(np.abs(at[name]).max()) > _WIDE:
+        if not robot.is_prismatic(name) and float(np.abs(at[name]).max()) > WIDE:
             words = f"{name} reaches {np.abs(at[name]).max():.4g} rad; if these are degrees, write '{name} [deg]'"
             break
     else:
-        far = [n for n in (*POSITION, "distance") if n in at and float(np.abs(at[n]).max()) > _FAR]
+        far = [n for n in (*POSITION, "distance") if n in at and float(np.abs(at[n]).max()) > FAR]
         if not far:
             return
         words = f"{far[0]} reaches {np.abs(at[far[0]]).max():.4g} m; if these are millimetres, write '{far[0]} [mm]'"

@@ -9,10 +9,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from cartctl.calibration.motions import Motion
 from cartctl.files import whole_file
 
 if TYPE_CHECKING:
     from cartctl.calibration.result import Calibration
+
+WIDE = 4.0 * math.pi  # rad: no joint turns farther, but degrees look like this
+FAR = 50.0  # m: no arm reaches farther, but millimetres look like this
 
 
 def summary(result: Calibration) -> str:
@@ -29,7 +33,25 @@ def summary(result: Calibration) -> str:
     if result.rank_after > result.rank:
         more = result.rank_after - result.rank
         lines.append(f"at the estimate {more} more would be seen, weakly: calibrate its chain again to use them")
-    return "\n".join(lines)
+    return "\n".join([*lines, *suspicions(result)])
+
+
+def suspicions(result: Calibration) -> list[str]:
+    """What looks like degrees or millimetres, a line each."""
+    found = []
+    turning = [m.joint for m in result.nominal.product.steps if isinstance(m, Motion) and m.joint >= 0 and m.turns]
+    widest = float(np.abs(result.q[:, turning]).max(initial=0.0))
+    if widest > WIDE:
+        found.append(f"q reaches {widest:.4g} rad; if these are degrees, convert them by np.radians")
+    entry = max(
+        (abs(result.nominal.value(n)) for n in result.nominal.names if n[:5] in ("alpha", "theta")), default=0.0
+    )
+    if entry > WIDE:
+        found.append(f"the table has an angle of {entry:.4g} rad; if these are degrees, convert them by np.radians")
+    far = max(float(np.abs(result.data.position).max()), float(result.data.length.max()))
+    if far > FAR:
+        found.append(f"the measurements reach {far:.4g} m; if these are millimetres, divide them by 1000")
+    return found
 
 
 def facts(result: Calibration) -> dict[str, Any]:

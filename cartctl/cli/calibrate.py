@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from cartctl.calibration import Calibration, CrossValidation, MeasurementTable, RobotChain
 
 _UNITS = {"m": (1e3, "mm"), "rad": (1e3, "mrad")}
+FOLDS = 5
 _SHOWN = 12  # parameters and unseen directions printed; the report has all
 
 _ROBOT = typer.Option(
@@ -54,7 +55,7 @@ def calibrate(
     ] = False,
     noise: Annotated[str | None, _NOISE] = None,
     loss: Annotated[str, _LOSS] = "linear",
-    folds: Annotated[int, typer.Option("--folds", metavar="K", help="Cross-validate in K parts; 0 for not.")] = 5,
+    folds: Annotated[int, typer.Option("--folds", metavar="K", help="Cross-validate in K parts; 0 for not.")] = FOLDS,
     out_dir: options.OutDir = Path("out"),
     open_page: options.Open = False,
     debug: Debug = False,
@@ -83,7 +84,7 @@ def calibrate(
     with busy("calibrating"):
         result = cc.calibrate(chain, table.q, table.values, **given)  # type: ignore[arg-type]
         check = None
-        if 2 <= folds <= len(table):
+        if folds and (folds != FOLDS or len(table) >= FOLDS):  # by default only where there are enough
             check = calibration.cross_validate(chain, table.q, table.values, folds=folds, **given)  # type: ignore[arg-type]
     console.print("", _errors(result, check), "")
     _remarks(result)
