@@ -119,7 +119,7 @@ def _by_shape(values: Any) -> str:
         if any(hasattr(item, "homogeneous") for item in items):
             return "pose"
         values = checks.floats("measurements", items)
-    return "distance" if values.ndim == 1 else "position" if values.shape[1:] == (3,) else "pose"
+    return "distance" if values.ndim == 1 else "position" if values.shape[1:] in ((3,), (2,)) else "pose"
 
 
 def _poses(values: Any, count: int) -> tuple[FloatArray, FloatArray]:
@@ -156,7 +156,8 @@ def _poses(values: Any, count: int) -> tuple[FloatArray, FloatArray]:
 def _sound(name: str, values: Any, shape: tuple[int, ...]) -> FloatArray:
     array = checks.floats(name, values)
     if array.shape != shape:
-        raise ShapeError(f"{name} has shape {array.shape}; expected {shape}, one entry for each row of q")
+        planar = "; give positions in a plane a z of 0" if array.shape == (shape[0], 2) else ""
+        raise ShapeError(f"{name} has shape {array.shape}; expected {shape}, one entry for each row of q{planar}")
     flat = np.isfinite(array)
     if not flat.all():
         checks.matrix(name, array.reshape(len(array), -1))

@@ -41,7 +41,9 @@ class Calibration:
     which the parameters stay nominal (least change of the column-scaled ones); determined: (p,) bool, which parameters
     have no part in any. rank_after: the rank at the estimate; if larger than rank, the nominal chain hid something.
     noise: standard deviations, one a unit, given or estimated. weights: (N,) of the loss.
-    outliers: numbers of the measurements farther off than 1 in 10,000 sound ones. outcome: how it ended.
+    outliers: numbers of the measurements farther off than 1 in 10,000 sound ones. outcome: how it ended. data, q: what
+    was measured, and where, (N, n). before: residuals with the nominal values, (N, rows), m and rad. fit, seen: the
+    numbers behind all this. noise_known: whether the noise was given.
     """
 
     chain: Chain

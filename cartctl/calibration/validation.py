@@ -11,6 +11,7 @@ from cartctl import checks
 from cartctl.calibration.calibrate import as_chain, calibrate
 from cartctl.calibration.measurements import read
 from cartctl.calibration.result import Calibration, Errors, errors_of
+from cartctl.calibration.selection import Parameters
 from cartctl.checks import FloatArray, IntArray
 from cartctl.errors import ParameterError
 
@@ -37,17 +38,21 @@ def cross_validate(
     *,
     folds: int = 5,
     seed: int = 0,
+    parameters: Parameters = None,
+    kind: str | None = None,
     frame: str | None = None,
     base: Any = None,
     tool: Any = None,
-    kind: str | None = None,
     anchor: Any = None,
-    **options: Any,
+    noise: Any = None,
+    loss: str = "linear",
+    iterations: int = 50,
+    agreement: float = 1e-9,
+    rank_tolerance: float = 1e-6,
 ) -> CrossValidation:
     """Calibrate without each of ``folds`` parts of the data in turn, and predict that part.
 
-    Arguments and errors as of :func:`cartctl.calibrate`, to which ``options`` go; ParameterError where folds is not in
-    [2, N].
+    Arguments and errors as of :func:`cartctl.calibrate`; ParameterError where folds is not in [2, N].
     """
     chain = as_chain(chain_or_robot, frame, base, tool)
     q = checks.floats("q", q)
@@ -63,7 +68,19 @@ def cross_validate(
         kept, left = np.flatnonzero(fold != k), np.flatnonzero(fold == k)
         part = data.part(kept)
         anchors = part.anchor if data.kind == "distance" else None
-        found = calibrate(chain, q[kept], part.values, kind=data.kind, anchor=anchors, **options)
+        found = calibrate(
+            chain,
+            q[kept],
+            part.values,
+            parameters=parameters,
+            kind=data.kind,
+            anchor=anchors,
+            noise=noise,
+            loss=loss,
+            iterations=iterations,
+            agreement=agreement,
+            rank_tolerance=rank_tolerance,
+        )
         residuals[left] = data.part(left).residuals(found.chain.product.poses(angles[left]))
         results.append(found)
     before = data.residuals(chain.product.poses(angles))
