@@ -243,6 +243,7 @@ def test_too_few_measurements_are_reported_not_inverted():
     assert found.rank == 6 and np.isfinite(found.delta).all() and np.abs(found.delta).max() < 0.1
     assert found.errors()[0].rms < 1e-9
     assert np.isinf(found.covariance).all() and np.isinf(found.interval()).all() and found.contains(np.ones(28))
+    assert "6 numbers were measured for 6 unknowns" in found.summary()
     known = cc.calibrate(panda(), data.q, data.poses, noise=(1e-4, 2e-4))
     assert np.isfinite(known.covariance).all()
     twice = cc.calibrate(panda(), np.tile(data.q, (30, 1)), np.tile(data.poses, (30, 1, 1)))

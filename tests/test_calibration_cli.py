@@ -142,6 +142,22 @@ def test_positions_and_distances(folder: Path, kind: str) -> None:
     assert len(facts["parameters"]) == 8 and len(job.data.q) == facts["measurements"]
 
 
+def test_too_few_and_other_units_are_warned_of(folder: Path) -> None:
+    """Two poses fit anything; degrees read as radians do not converge, and a script sees that by the exit code."""
+    Job(folder / "m.csv", far=False)
+    lines = Path("m.csv").read_text().splitlines(keepends=True)
+    Path("few.csv").write_text("".join(lines[:3]))
+    few = cartctl("calibrate", "few.csv", "--robot", "lwr")
+    assert few.exit_code == 0 and "12 numbers were measured for 12 unknowns" in few.stderr
+    head = re.sub(r" [\[(](deg|mm)[\])]", "", lines[0])
+    Path("units.csv").write_text(head + "".join(lines[1:]))
+    wrong = cartctl("calibrate", "units.csv", "--robot", "lwr", "--folds", "0")
+    assert "[deg]" in wrong.stderr and "warning: " in wrong.stderr
+    assert wrong.exit_code == (1 if "the files hold what was reached" in wrong.stderr else 0)
+    facts = json.loads(Path("out/lwr-calibrated.json").read_text())
+    assert (facts["outcome"] == "CONVERGED") == (wrong.exit_code == 0) and facts["after"][0]["rms"] > 1.0
+
+
 def test_meshes_are_found_by_the_call_it_prints(folder: Path) -> None:
     robot = cc.load("panda")
     data = measure(cal.RobotChain(robot), "placements", 1)

@@ -35,7 +35,7 @@ class Outcome(Enum):
     AGREES = "the data agree with the nominal parameters already; nothing was changed"
     CONVERGED = "the last step was far below the standard errors"
     STALLED = "no step lowers the residuals further; the nominal values may be far off (see aligned() for the base)"
-    ITERATIONS = "not converged when the iterations ended; raise iterations="
+    ITERATIONS = "not converged when the iterations ended; check units and nominal values, or raise iterations="
     NOTHING_SEEN = "the measurements see none of these parameters; measure something else, or elsewhere"
 
     def __str__(self) -> str:

@@ -37,8 +37,11 @@ def summary(result: Calibration) -> str:
 
 
 def suspicions(result: Calibration) -> list[str]:
-    """What looks like degrees or millimetres, a line each."""
+    """What looks like degrees, millimetres or too few measurements, a line each."""
     found = []
+    if result.spare <= 0:
+        count = f"{result.residuals.size} numbers were measured for {result.rank} unknowns"
+        found.append(f"{count}: they fit whatever they are, and nothing checks them; measure more")
     turning = [m.joint for m in result.nominal.product.steps if isinstance(m, Motion) and m.joint >= 0 and m.turns]
     widest = float(np.abs(result.q[:, turning]).max(initial=0.0))
     if widest > WIDE:

@@ -64,7 +64,7 @@ def calibrate(
 
     The header of the CSV names each joint and what was measured, with units in brackets if they are not rad and m:
     x y z (positions), with qx qy qz qw (poses), or distance, with ax ay az for its anchor. Writes a URDF, a JSON and an
-    HTML report: all of them or none.
+    HTML report: all of them or none. Ends with 1 where the estimate did not converge.
     """
     import cartctl as cc
     from cartctl import calibration
@@ -94,6 +94,8 @@ def calibrate(
     console.print(facts([("load it by", _load(result.chain, place.at(".urdf")))]))
     if open_page:
         files.show(place.at(".html"))
+    if not _healthy(result):
+        raise typer.Exit(1)
 
 
 def _numbers(text: str | None) -> list[float] | None:
@@ -131,8 +133,12 @@ def _errors(result: Calibration, check: CrossValidation | None) -> Table:
 
 def _remarks(result: Calibration) -> None:
     """What a reader must not miss, on standard error."""
-    if result.outcome.name not in ("CONVERGED", "AGREES"):
-        say("warning", str(result.outcome), "bold yellow")
+    from cartctl.calibration.written import suspicions
+
+    if not _healthy(result):
+        say("warning", f"{result.outcome}; the files hold what was reached", "bold yellow")
+    if result.spare <= 0:
+        say("warning", suspicions(result)[0], "bold yellow")
     if len(result.outliers):
         shown = ", ".join(str(k) for k in result.outliers[:_SHOWN]) + ", ..." * (len(result.outliers) > _SHOWN)
         advice = "" if result.loss != "linear" else "; --loss huber keeps them from pulling the estimate"
@@ -141,6 +147,10 @@ def _remarks(result: Calibration) -> None:
         say("note", str(one), "bold")
     if (more := len(result.unidentifiable) - _SHOWN) > 0:
         say("note", f"{more} more combinations cannot be told apart; the report lists them", "bold")
+
+
+def _healthy(result: Calibration) -> bool:
+    return result.outcome.name in ("CONVERGED", "AGREES")
 
 
 def _estimates(result: Calibration) -> Table:
