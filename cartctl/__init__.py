@@ -64,6 +64,9 @@ _HOMES = {
         "RelativeFrameTask",
         "Task",
     ),
+    "cartctl.calibration.calibrate": ("calibrate",),
+    "cartctl.calibration.dh_chain": ("DHChain",),
+    "cartctl.calibration.result": ("Calibration",),
     "cartctl.constraints": ("Avoid", "AvoidSelf", "Constraint", "FrameBox", "FrameSpeed", "HalfSpace"),
     "cartctl.objectives": (
         "Clearance",
@@ -107,7 +110,13 @@ _HOMES = {
         "Waypoints",
     ),
 }
-_MODULES = ("analysis", "dynamics", "spatial", "statics")  # reached as cc.NAME; their names stay inside them
+_MODULES = (
+    "analysis",
+    "calibration",
+    "dynamics",
+    "spatial",
+    "statics",
+)  # reached as cc.NAME; their names stay inside them
 _HOME_OF = {name: module for module, names in _HOMES.items() for name in names}
 
 __all__ = ["__version__", *sorted(_HOME_OF)]  # noqa: PLE0604 - names, from the table above
@@ -127,6 +136,9 @@ if TYPE_CHECKING:  # editors and mypy see what __getattr__ finds
     from cartctl.algebra.problem import Problem as Problem
     from cartctl.algebra.solution import Solution as Solution
     from cartctl.algebra.solution import Status as Status
+    from cartctl.calibration.calibrate import calibrate as calibrate
+    from cartctl.calibration.dh_chain import DHChain as DHChain
+    from cartctl.calibration.result import Calibration as Calibration
     from cartctl.constraints import Avoid as Avoid
     from cartctl.constraints import AvoidSelf as AvoidSelf
     from cartctl.constraints import Constraint as Constraint

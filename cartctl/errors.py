@@ -102,6 +102,10 @@ class RunFileError(CartctlError, ValueError):
     """A saved run cannot be read."""
 
 
+class MeasurementError(CartctlError, ValueError):
+    """A table of measurements has a wrong header, or a cell that is no number."""
+
+
 class MissingDependencyError(CartctlError, ImportError):
     """A package is missing; the message holds the command that installs it."""
 
@@ -153,6 +157,12 @@ class LevelNotFound(LookupFailure):
     """No level of that name."""
 
     kind = "level"
+
+
+class ParameterNotFound(LookupFailure):
+    """A kinematic chain has no parameter, or group of parameters, of that name."""
+
+    kind = "parameter"
 
 
 class RunInterrupted(KeyboardInterrupt):  # noqa: N818 - it is an interrupt, not an error

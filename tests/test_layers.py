@@ -41,8 +41,9 @@ MAY_IMPORT = {
     "levels": JOINED - {"levels"},
     "files": {"errors"},
     "motion": JOINED | {"files"},
-    "report": JOINED | {"files", "motion"},
-    "cli": JOINED | {"analysis", "files", "motion", "report"},
+    "calibration": JOINED | {"files"},
+    "report": JOINED | {"files", "motion", "calibration"},
+    "cli": JOINED | {"analysis", "calibration", "files", "motion", "report"},
     "__main__": {"cli"},
 }
 # The one named exception: Run.plot and Run.html.

@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 
 from cartctl import __version__
+from cartctl.cli.calibrate import calibrate
 from cartctl.cli.compare import compare
 from cartctl.cli.doctor import doctor
 from cartctl.cli.info import info
@@ -47,5 +48,9 @@ app.command(
     epilog="Example:  cartctl compare panda\n\n"
     "Example:  cartctl compare panda --solvers pinv,projected-gradient,extended-jacobian --laps 5 --open"
 )(compare)
+app.command(
+    epilog="Example:  cartctl calibrate measured.csv --robot panda --parameters 'placements tool' --align --open\n\n"
+    "Header, for example:  panda_joint1 (deg),...,panda_joint7 (deg),x (mm),y (mm),z (mm)"
+)(calibrate)
 app.command(epilog="Example:  cartctl info panda")(info)
 app.command(epilog="Example:  cartctl doctor")(doctor)

@@ -1,4 +1,4 @@
-"""Reports of a Run, or of several side by side: one HTML file with the moving robots, one figure of their numbers.
+"""Reports of a Run, of several side by side, or of a calibration: one HTML file, one figure of the numbers.
 
 Loaded on first use: the page needs meshcat, the figure matplotlib, and neither should wait for the other.
 """
@@ -9,14 +9,18 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from cartctl.report.calibration_figure import plot_calibration as plot_calibration
+    from cartctl.report.calibration_page import write_calibration_html as write_calibration_html
     from cartctl.report.comparison import Comparison as Comparison
     from cartctl.report.html import write_html as write_html
     from cartctl.report.plots import plot_run as plot_run
 
-__all__ = ["Comparison", "plot_run", "write_html"]
+__all__ = ["Comparison", "plot_calibration", "plot_run", "write_calibration_html", "write_html"]
 
 _HOMES = {
     "Comparison": "cartctl.report.comparison",
+    "plot_calibration": "cartctl.report.calibration_figure",
+    "write_calibration_html": "cartctl.report.calibration_page",
     "write_html": "cartctl.report.html",
     "plot_run": "cartctl.report.plots",
 }
