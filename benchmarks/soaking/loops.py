@@ -95,6 +95,11 @@ class Loop:
             a = (v - before) / dt
             moved[0], moved[1], moved[2], moved[3] = robot.coordinates(q), v, a, (a - a_before) / dt
             self.made += 1
+            if (
+                solution.status is cc.Status.YIELDED
+            ):  # torques first: limits that contradict them were left, and it says so
+                self.statuses[solution.status.name] += 1
+                return ""
             what = self._judged(moved, solution)
             if not what and self.asked[k]:
                 what = self._proven(solution)

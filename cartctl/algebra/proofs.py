@@ -24,6 +24,7 @@ PRIMAL, DUAL, GAP = 0, 1, 2
 _NOISE = 1e-12  # of the largest multiplier
 _CLEAR = 1e-14  # of the terms of h: a sum this small has no sign
 _MISSED = 1e-10  # relative: an interval missed by less is met
+_TINY = 1e-290  # numbers below this have too few digits left to be judged by
 _LAST_BITS = 1e-14  # relative: a miss this small is round-off
 _GROUND = 1e-8  # of the largest bound: a u smaller than this is judged as if it were this large
 _COARSE = 1e-4  # of u and u0: steps below this are judged as if they were this large
@@ -67,7 +68,7 @@ def check_proofs(
     level = np.empty(M + n + r, np.int64)
     holder = np.full(M + n + r, p)  # the first level whose proof needs a row
     rows = (A, b, d, sizes, fits, natural, lower, upper, C, c_lower, c_upper)
-    ground = _GROUND * max(_farthest(lower), _farthest(upper))
+    ground = _GROUND * max(_farthest(lower), _farthest(upper), _farthest_row(C, c_lower, c_upper))
     least = ground * (pull / reach if reach > 0.0 else 1.0)  # forces below this are none
     if 0.0 < reach < ground:
         pull, reach = least, ground
@@ -98,7 +99,7 @@ def check_proofs(
             terms = max(terms, _COARSE * pull, least)
         elif fits[k] != SCALED:
             terms = max(terms, _MET * _weight(x, low, high, span, level, k, size))
-        residuals[k, DUAL] = rest / terms if terms > 0.0 else 0.0
+        residuals[k, DUAL] = rest / terms if terms > _TINY else 0.0
         residuals[k, PRIMAL] = 0.0  # a fitted or skipped level promises nothing of its own rows
         if k == p or (fits[k] == SCALED and scales[k] == scales[k]):
             residuals[k, PRIMAL] = _primal(x, low, high, span, level, given, k, p, size)
@@ -120,6 +121,18 @@ def _farthest(bounds: FloatArray) -> float:
     for i in range(bounds.shape[0]):
         if abs(bounds[i]) < np.inf:
             largest = max(largest, abs(bounds[i]))
+    return largest
+
+
+@part
+def _farthest_row(C: FloatArray, c_lower: FloatArray, c_upper: FloatArray) -> float:
+    """The largest finite bound of a row, in units of u."""
+    largest = 0.0
+    for i in range(C.shape[0]):
+        norm = np.sqrt(np.sum(C[i] ** 2))
+        for side in (c_lower[i], c_upper[i]):
+            if norm > 0.0 and abs(side) < np.inf:
+                largest = max(largest, abs(side) / norm)
     return largest
 
 
