@@ -101,7 +101,7 @@ class TorqueLevel(Level):
         """The problem of this instant, and the references it was made from; raises NonFiniteError, ShapeError."""
         lower, upper, outside, _, torque = confines
         M = state.mass_matrix  # before the Jacobians, which come along
-        J, rest, sizes, references = self._asked(state, tasks, times, anchors)
+        J, rest, sizes, references = self.asked(state, tasks, times, anchors)
         h = self.loads.effects(state)
         low, high = (_NONE, _NONE) if lower is None or upper is None else (lower, upper)
         (m, nv), r = J.shape, low.shape[0]
@@ -121,7 +121,7 @@ class TorqueLevel(Level):
         least, most = (None, None) if torque is None else torque
         return Problem.trusted(tuple(equations), metric, u0, least, most, blocks), references
 
-    def _asked(
+    def asked(
         self,
         state: State,
         tasks: Sequence[Task],

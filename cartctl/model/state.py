@@ -9,7 +9,7 @@ import pinocchio as pin
 
 from cartctl.checks import FloatArray
 from cartctl.model.differences import central
-from cartctl.model.hessian import kinematic_hessian
+from cartctl.model.hessian import jacobian_drift, kinematic_hessian
 
 if TYPE_CHECKING:
     from cartctl.model.robot import Robot
@@ -33,7 +33,6 @@ class State:
     """
 
     __slots__ = (
-        "_accelerated",
         "_cache",
         "_data",
         "_frames",
@@ -41,7 +40,6 @@ class State:
         "_kinematics",
         "_model",
         "_poses",
-        "_rest",
         "q",
         "robot",
         "stamp",
@@ -56,7 +54,6 @@ class State:
         self._frames: dict[str, FrameView] = {}
         self._joints: list[tuple[FloatArray, FloatArray]] = []
         self.stamp = 0
-        self._rest = np.zeros(robot.nv)
         self.set(robot.neutral, np.zeros(robot.nv))
 
     def set(self, q: FloatArray, v: FloatArray, time: float = 0.0) -> None:
@@ -66,7 +63,6 @@ class State:
         self.time = time
         self.stamp += 1
         self._kinematics = False
-        self._accelerated = False
         self._cache: dict[str, FloatArray] = {}
 
     def place(self, frame: str) -> FrameView:
@@ -140,15 +136,18 @@ class State:
 
     def drift(self, frame: str) -> FloatArray:
         """``J_dot v``, (6,): the classical acceleration of ``frame`` at zero joint acceleration, m/s^2 and rad/s^2."""
-        key = "drift " + frame
-        if key not in self._cache:
-            fid = self.robot.frame_id(frame)
-            if not self._accelerated:
-                pin.forwardKinematics(self._model, self._data, self.q, self.v, self._rest)
-                self._accelerated = True
-            motion = pin.getFrameClassicalAcceleration(self._model, self._data, fid, _WORLD_ALIGNED)
-            self._cache[key] = _frozen(motion.vector)
-        return self._cache[key]
+        view = self.place(frame)
+        if view.accelerated != self.stamp:
+            if self.robot.mimics:
+                pin.forwardKinematics(self._model, self._data, self.q, self.v, np.zeros(self._model.nv))
+                motion = pin.getFrameClassicalAcceleration(self._model, self._data, view.fid, _WORLD_ALIGNED)
+                view.drift = np.array(motion.vector)
+            else:
+                view.drift = np.empty(6)
+                jacobian_drift.compiled(self.jacobian(frame), self.v, self.robot.order, view.drift)
+            view.drift.flags.writeable = False
+            view.accelerated = self.stamp
+        return view.drift
 
     def hessian(self, frame: str) -> FloatArray:
         """``dJ_aj / dq_i``, (6, nv, nv) as [a, j, i]: how :meth:`jacobian` changes along each tangent coordinate.
@@ -191,7 +190,6 @@ class State:
         """``dg_j / dq_i``, (nv, nv) as [j, i], N m/rad; with mimic joints, central differences."""
         if self.robot.mimics:
             return self._once("dg", lambda: central(self, lambda s: s.gravity))
-        self._accelerated = False  # overwritten by what follows
         return self._once(
             "dg", lambda: _square(pin.computeGeneralizedGravityDerivatives(self._model, self._data, self.q))
         )
@@ -200,7 +198,6 @@ class State:
         """``d(M(q) a)_j / dq_i`` of a constant a (nv,), (nv, nv) as [j, i]; with mimic joints, central differences."""
         if self.robot.mimics:
             return central(self, lambda s: s.mass_matrix @ a)
-        self._accelerated = False  # overwritten by what follows
         at_rest = np.zeros(self._model.nv)
         turned = pin.computeRNEADerivatives(self._model, self._data, self.q, at_rest, a)[0]
         return _square(np.array(turned)) - self.gravity_gradient
@@ -231,9 +228,19 @@ class State:
 
 
 class FrameView:
-    """One frame inside a State's data: its pose as views of Pinocchio's memory, and its Jacobian."""
+    """One frame inside a State's data: its pose as views of Pinocchio's memory, its Jacobian and drift."""
 
-    __slots__ = ("differentiated", "fid", "jacobian", "placed", "pose", "rotation", "translation")
+    __slots__ = (
+        "accelerated",
+        "differentiated",
+        "drift",
+        "fid",
+        "jacobian",
+        "placed",
+        "pose",
+        "rotation",
+        "translation",
+    )
 
     def __init__(self, data: pin.Data, fid: int) -> None:
         self.fid = fid
@@ -241,7 +248,8 @@ class FrameView:
         self.translation: FloatArray = self.pose.translation
         self.rotation: FloatArray = self.pose.rotation
         self.jacobian: FloatArray = np.zeros((6, 0))
-        self.placed = self.differentiated = -1
+        self.drift: FloatArray = np.zeros(6)
+        self.placed = self.differentiated = self.accelerated = -1
 
 
 def _frozen(array: Any) -> FloatArray:

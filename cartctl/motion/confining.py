@@ -73,20 +73,16 @@ class Confining:
 
     def at(self, state: State) -> Confines:
         """What confines u at a state."""
-        if self._bounds is None:
-            self.recovering = False
-            box = None
-        else:
+        lower = upper = rows = approach = None
+        self.recovering = False
+        if self._bounds is not None:
             lower, upper, self.recovering = self._bounds(self._coordinates(state.q), state.v)
-            box = Box(lower, upper)
-        rows = None
+            approach = self._approach
         if self._constraints:
+            box = None if lower is None or upper is None else Box(lower, upper)
             blocks = stacked([self._level.rows(c, state, self._dt, box) for c in self._constraints])
             rows = None if blocks is None else (blocks.C, blocks.lower, blocks.upper)
-        if box is None:
-            self._now = Confines(None, None, rows, None, self._torque)
-        else:
-            self._now = Confines(box.lower, box.upper, rows, self._approach, self._torque)
+        self._now = Confines(lower, upper, rows, approach, self._torque)
         return self._now
 
     def widened(self, problem: Problem, state: State) -> Widened:

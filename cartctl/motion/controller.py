@@ -18,6 +18,8 @@ from cartctl.errors import CartctlWarning, NoTasksError, ParameterError, Problem
 from cartctl.levels import Command, Level, Secondary, get_level
 from cartctl.levels.metrics import as_state_metric
 from cartctl.levels.singularity import Guard
+from cartctl.levels.torque import TorqueLevel
+from cartctl.levels.torque_fused import FusedTorque, fuses
 from cartctl.levels.yielding import missed
 from cartctl.model.limits import Limits
 from cartctl.model.robot import Robot
@@ -99,6 +101,7 @@ class Controller:
         self._weighing = metric if isinstance(metric, str) else "identity" if metric is None else ""
         self._alone = self._secondary(0.0)
         self.solver.prepare()
+        self._fused = self._fused_way()
         self._constraints, self._disabled, self._jerk, self._approach = constraints, disabled, jerk, approach
         clocked = _clocked(path_clock, self.tasks, self.solver.scales or self._guard.waits, self.level)
         self._clocks = PathClocks(clocked)
@@ -136,6 +139,14 @@ class Controller:
         given = (self._constraints, self._disabled, self._jerk, self._approach)
         return Confining(self.robot, self.level, self.solver, limits, *given, self.dt, self._waiting)
 
+    def _fused_way(self) -> FusedTorque | None:
+        """Level and solver in one, where there is such a way for them; else they are asked one after the other."""
+        if self._guard.acts or not isinstance(self.level, TorqueLevel):
+            return None
+        if not fuses(self.level, self.solver, self._metric):
+            return None
+        return FusedTorque(self.level, self.solver, self.tasks, self.robot.nv)
+
     def times(self, t: float) -> list[float]:
         """Each task's own time when everybody else's is t: later by what its path has waited."""
         return self._clocks.times(t)
@@ -165,14 +176,22 @@ class Controller:
         secondary = self._alone if self.objective is None else self._secondary(t - started)
         times = self._clocks.times(t)
         confines = self._confining.at(state)
-        problem, references = self.level.problem(state, self.tasks, times, anchors, secondary, metric, confines)
-        left, guarded, halted = self._guard.guard(problem, state)
-        solution = self._halt(left, state) if halted else self._solve(left, state)
-        solution.guarded = guarded
+        found = None
+        if self._fused is not None:
+            found = self._fused.answer(state, times, anchors, secondary, confines, self._last)
+        if found is None:
+            problem, references = self.level.problem(state, self.tasks, times, anchors, secondary, metric, confines)
+            left, guarded, halted = self._guard.guard(problem, state)
+            solution = self._halt(left, state) if halted else self._solve(left, state)
+            solution.guarded = guarded
+        else:
+            solution, references = found
+            solution.recovering = self._confining.recovering
         self._anchors, self._started = anchors, started  # only now: a refused step leaves no trace
         self._last = solution
         self.step_times = times
-        self._clocks.tick(t, times, references, problem.equations, solution.u)
+        if self._waiting:
+            self._clocks.tick(t, times, references, problem.equations, solution.u)
         return self.level.command(solution, references, state)
 
     @property
