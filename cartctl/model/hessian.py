@@ -13,7 +13,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from cartctl.checks import FloatArray, IntArray
-from cartctl.kernels import kernel
+from cartctl.kernels import kernel, part
 
 # Joints of several dofs whose rates are those of the body: each of them turns with all of them.
 _OF_THE_BODY = ("FreeFlyer", "Planar", "Spherical")
@@ -47,13 +47,8 @@ def kinematic_hessian(J: FloatArray, carried: NDArray[np.bool_]) -> FloatArray:
     return H
 
 
-@kernel("void(matrix, vector, ints, out_vector)")
-def jacobian_drift(J: FloatArray, v: FloatArray, order: IntArray, drift: FloatArray) -> None:
-    """Fill ``J_dot v = sum_ij dJ_j/dq_i v_i v_j`` (6,), by running sums of the twists on the way to the frame.
-
-    With Omega_j the angular velocity of all that carries j, itself included, and Omega_<j that of what carries it and
-    is not it, the linear part is ``sum_j (Omega_j + Omega_<j) x v_j``, the angular one ``sum_j Omega_j x w_j``.
-    """
+@part
+def _drift(J: FloatArray, v: FloatArray, order: IntArray, drift: FloatArray) -> None:
     a = b = c = 0.0  # Omega_<j
     drift[:] = 0.0
     j, n = 0, J.shape[1]
@@ -73,3 +68,20 @@ def jacobian_drift(J: FloatArray, v: FloatArray, order: IntArray, drift: FloatAr
         drift[5] += a * q - b * p
         a, b, c = a + p, b + q, c + r
         j = i
+
+
+@kernel("void(matrix, vector, ints, out_vector)")
+def jacobian_drift(J: FloatArray, v: FloatArray, order: IntArray, drift: FloatArray) -> None:
+    """Fill ``J_dot v = sum_ij dJ_j/dq_i v_i v_j`` (6,), by running sums of the twists on the way to the frame.
+
+    With Omega_j the angular velocity of all that carries j, itself included, and Omega_<j that of what carries it and
+    is not it, the linear part is ``sum_j (Omega_j + Omega_<j) x v_j``, the angular one ``sum_j Omega_j x w_j``.
+    """
+    _drift(J, v, order, drift)
+
+
+@kernel("void(matrix, matrix, ints, out_matrix)")
+def jacobian_drifts(J: FloatArray, V: FloatArray, order: IntArray, drifts: FloatArray) -> None:
+    """The same of several velocities, the rows of V (k, nv), as columns of drifts (6, k)."""
+    for i in range(V.shape[0]):
+        _drift(J, V[i], order, drifts[:, i])

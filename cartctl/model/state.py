@@ -9,7 +9,7 @@ import pinocchio as pin
 
 from cartctl.checks import FloatArray
 from cartctl.model.differences import central
-from cartctl.model.hessian import jacobian_drift, kinematic_hessian
+from cartctl.model.hessian import jacobian_drift, jacobian_drifts, kinematic_hessian
 
 if TYPE_CHECKING:
     from cartctl.model.robot import Robot
@@ -40,6 +40,7 @@ class State:
         "_kinematics",
         "_model",
         "_poses",
+        "_rates",
         "q",
         "robot",
         "stamp",
@@ -53,7 +54,7 @@ class State:
         self._data = robot.model.createData()
         self._frames: dict[str, FrameView] = {}
         self._joints: list[tuple[FloatArray, FloatArray]] = []
-        self.stamp = 0
+        self.stamp = self._rates = 0
         self.set(robot.neutral, np.zeros(robot.nv))
 
     def set(self, q: FloatArray, v: FloatArray, time: float = 0.0) -> None:
@@ -62,8 +63,16 @@ class State:
         self.v = v
         self.time = time
         self.stamp += 1
+        self._rates += 1
         self._kinematics = False
         self._cache: dict[str, FloatArray] = {}
+
+    def turn(self, v: FloatArray) -> None:
+        """Take another velocity, already checked, where it is: what depends on q alone stays; for such loops, too."""
+        self.v = v
+        self._rates += 1
+        self._cache.pop("h", None)
+        self._cache.pop("com drift", None)
 
     def place(self, frame: str) -> FrameView:
         """Views of ``frame``'s pose that change with the next ``set``; :meth:`placement` copies."""
@@ -137,7 +146,7 @@ class State:
     def drift(self, frame: str) -> FloatArray:
         """``J_dot v``, (6,): the classical acceleration of ``frame`` at zero joint acceleration, m/s^2 and rad/s^2."""
         view = self.place(frame)
-        if view.accelerated != self.stamp:
+        if view.accelerated != self._rates:
             if self.robot.mimics:
                 pin.forwardKinematics(self._model, self._data, self.q, self.v, np.zeros(self._model.nv))
                 motion = pin.getFrameClassicalAcceleration(self._model, self._data, view.fid, _WORLD_ALIGNED)
@@ -146,8 +155,20 @@ class State:
                 view.drift = np.empty(6)
                 jacobian_drift.compiled(self.jacobian(frame), self.v, self.robot.order, view.drift)
             view.drift.flags.writeable = False
-            view.accelerated = self.stamp
+            view.accelerated = self._rates
         return view.drift
+
+    def drifts(self, frame: str, V: FloatArray) -> FloatArray:
+        """``J_dot(v_i) v_i`` for every row v_i of V (k, nv), as columns, (6, k)."""
+        drifts = np.empty((6, V.shape[0]))
+        if self.robot.mimics:
+            own = State(self.robot)
+            for i, v in enumerate(V):
+                own.set(self.q, v, self.time)
+                drifts[:, i] = own.drift(frame)
+        else:
+            jacobian_drifts.compiled(self.jacobian(frame), V, self.robot.order, drifts)
+        return drifts
 
     def hessian(self, frame: str) -> FloatArray:
         """``dJ_aj / dq_i``, (6, nv, nv) as [a, j, i]: how :meth:`jacobian` changes along each tangent coordinate.

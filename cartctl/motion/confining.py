@@ -55,7 +55,7 @@ class Confining:
             else:
                 _warn_of_rows(solver, level)
             if approach and level.approaching is not None:
-                self._approach = level.approaching(limits, dt, State(robot), solver, waiting)
+                self._approach = level.approaching(limits, dt, solver, waiting)
         elif joints or jerk:
             what = "disabled" if joints else "jerk"
             raise ParameterError(f"{what} is given without limits; expected limits= for it to be a part of")
