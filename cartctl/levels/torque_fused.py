@@ -19,7 +19,7 @@ from cartctl.constraints import Box
 from cartctl.levels.base import Confines, Level, Secondary, direction
 from cartctl.levels.metrics import Metric
 from cartctl.levels.torque import TorqueLevel
-from cartctl.levels.torque_fused_kernel import LEFT, torque_sns
+from cartctl.levels.torque_fused_kernel import CLOSE, LEFT, torque_sns
 from cartctl.model.state import State
 from cartctl.solvers import Solver
 from cartctl.solvers.exact.kinds import FITTED, LOST_RANK, SCALED
@@ -61,8 +61,11 @@ class FusedTorque:
         secondary: Secondary,
         confines: Confines,
         start: Solution | None,
-    ) -> tuple[Solution, list[Reference]] | None:
-        """The solution and the references it was made from; None where the general way is to be taken."""
+    ) -> tuple[Solution, list[Reference], bool] | None:
+        """The solution, the references it was made from, and whether it is near a bound on an acceleration.
+
+        None where the general way is to be taken.
+        """
         lower, upper, constraints, _, torque = confines
         if constraints is not None:
             return None
@@ -109,7 +112,7 @@ class FusedTorque:
         solver = self._solver
         solution = Solution(put_together, rows[-1], solver.name, solver, None, lost, sides[2, : len(tasks)])
         solution.warm = active
-        return solution, references
+        return solution, references, bool(flags & CLOSE)
 
     def _drawn(self, state: State, secondary: Secondary) -> tuple[bool, FloatArray]:
         """Whether there is a u0, and what an objective adds to it, (nv,) or empty."""

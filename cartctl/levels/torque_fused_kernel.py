@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from cartctl.checks import FloatArray
 from cartctl.kernels import kernel, part
+from cartctl.levels.midway import NEAR, near
 from cartctl.levels.torque_kernel import through_inertia
 from cartctl.levels.torque_reference import FIRM, STIFF, STIFFEST
 from cartctl.levels.yielding import misses
@@ -20,6 +21,7 @@ from cartctl.solvers.exact.kinds import LOST_RANK
 from cartctl.solvers.exact.lexicographic import lexicographic
 
 LEFT = 1 << 20  # beside the engine's flags: the answer is left to the general way
+CLOSE = 1 << 21  # near a bound on an acceleration
 _LARGE = 1e150  # squares of what is below are finite
 
 
@@ -68,7 +70,7 @@ def torque_sns(
     sides: FloatArray,
     active: NDArray[np.int64],
 ) -> int:
-    """The engine's flags, or LEFT where something is out of the ordinary.
+    """The engine's flags, CLOSE among them, or LEFT where something is out of the ordinary.
 
     gains: k, (1,) or of each row. levels: (2 p,), the rows of each task, then their kinds. natural: (p,), the norm of
     each task's J by nature, 0 where it speaks for itself. torque: the box (2, n), or (2, 0). drawn: whether there is a
@@ -131,4 +133,6 @@ def torque_sns(
             return LEFT
     if r > 0 and misses(C, sides[0, m : m + r], sides[1, m : m + r], u):
         return LEFT
+    if r > 0 and near(C, sides[0, m : m + r], sides[1, m : m + r], u, r, NEAR):
+        return flags | CLOSE
     return flags

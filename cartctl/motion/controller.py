@@ -16,7 +16,9 @@ from cartctl.checks import LARGEST, FloatArray, is_moderate
 from cartctl.constraints import Constraint
 from cartctl.errors import CartctlWarning, NoTasksError, ParameterError, ProblemError, UnsupportedProblem
 from cartctl.levels import Command, Level, Secondary, get_level
+from cartctl.levels.base import Confines
 from cartctl.levels.metrics import as_state_metric
+from cartctl.levels.midway import ROUNDS, Midway
 from cartctl.levels.singularity import Guard
 from cartctl.levels.torque import TorqueLevel
 from cartctl.levels.torque_fused import FusedTorque, fuses
@@ -176,17 +178,20 @@ class Controller:
         secondary = self._alone if self.objective is None else self._secondary(t - started)
         times = self._clocks.times(t)
         confines = self._confining.at(state)
-        found = None
+        midway, found = self._confining.midway, None
         if self._fused is not None:
             found = self._fused.answer(state, times, anchors, secondary, confines, self._last)
         if found is None:
             problem, references = self.level.problem(state, self.tasks, times, anchors, secondary, metric, confines)
             left, guarded, halted = self._guard.guard(problem, state)
-            solution = self._halt(left, state) if halted else self._solve(left, state)
-            solution.guarded = guarded
+            solution = self._halt(left, state) if halted else self._solve(left, state, self._last)
+            close = midway is not None and not halted and midway.concerns(left, solution.u)
         else:
-            solution, references = found
-            solution.recovering = self._confining.recovering
+            solution, references, close = found
+            solution.recovering, guarded, left = self._confining.recovering, False, None
+        if close and midway is not None:
+            solution = self._over_the_step(midway, left, solution, state, confines)
+        solution.guarded = guarded
         self._anchors, self._started = anchors, started  # only now: a refused step leaves no trace
         self._last = solution
         self.step_times = times
@@ -212,22 +217,37 @@ class Controller:
         solution.recovering = self._confining.recovering
         return solution
 
-    def _solve(self, problem: Problem, state: State) -> Solution:
-        """The solver's answer, from the last one; where limits exclude each other they yield in their order.
+    def _over_the_step(
+        self, midway: Midway, problem: Problem | None, solution: Solution, state: State, confines: Confines
+    ) -> Solution:
+        """The answer that keeps the bounds over the step, and not only at its beginning; None: its own problem."""
+        for k in range(ROUNDS):
+            blocks = midway.better(solution.u, state, confines, again=k > 0)
+            if blocks is None:
+                break
+            p = problem = problem or solution.problem
+            bounds = (p.lower, p.upper, blocks)
+            p = Problem.trusted(p.equations, p.metric, p.reference, *bounds)
+            solution = self._solve(p, state, solution, midway.state)
+        return solution
 
-        A task with no feasible scale is slowed towards standing still.
+    def _solve(self, problem: Problem, state: State, start: Solution | None, at: State | None = None) -> Solution:
+        """The solver's answer, from an earlier one; where limits exclude each other they yield in their order.
+
+        A task with no feasible scale is slowed towards standing still. at: where M and h are taken from, if not from
+        the state.
         """
-        solution = self.solver.solve(problem, self._last)
+        solution = self.solver.solve(problem, start)
         yielded: tuple[str, ...] = ()
         if problem.constraints is not None and missed(solution):
             yielded = ("constraints",)
             if self._confining.yields:
-                problem, best, yielded = self._confining.widened(problem, state)
+                problem, best, yielded = self._confining.widened(problem, state, at)
                 solution = self.solver.solve(problem)
                 if missed(solution):
                     solution = Solution(problem, best, self.solver.name, status=Status.INFEASIBLE)
         if _skipped(solution) or (self._confining.yields and solution.failed):
-            stopping = self._confining.stopping(problem, state)
+            stopping = self._confining.stopping(problem, state, at)
             again = towards_rest(problem, ~(solution.scales == 1.0), stopping)
             solution = self.solver.solve(again, solution)
             if self._confining.yields and (_skipped(solution) or solution.failed):
