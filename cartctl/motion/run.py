@@ -123,7 +123,7 @@ class Run:
         return to_parquet(self, Path(path))
 
     def plot(self, path: str | os.PathLike[str] | None = None) -> Figure:
-        """A figure of errors, joints, rates, singular values and step time; written to ``path`` if given."""
+        """A figure of errors, joints, rates, torques, singular values and step time; written to ``path`` if given."""
         from cartctl.report import plot_run
 
         figure = plot_run(self)
