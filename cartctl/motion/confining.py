@@ -68,6 +68,11 @@ class Confining:
         self._now = UNCONFINED
         self._coordinates = _itself if robot.has_plain_coordinates else robot.coordinates
 
+    @property
+    def constraints(self) -> tuple[Constraint, ...]:
+        """The Cartesian constraints."""
+        return self._constraints
+
     def reset(self) -> None:
         """Forget the previous step."""
         if self._bounds is not None:

@@ -93,7 +93,7 @@ class Controller:
         self._guard = Guard(singularity, self.level, robot, self.tasks)
         self.objective = self._guard.objective(_checked_objective(objective, self.solver, robot))
         if self.objective is not objective:
-            _checked_objective(self.objective, self.solver, robot)
+            _checked_objective(self.objective, self.solver, robot, "another singularity policy")
         self.metric = metric
         self._extend = getattr(self.solver, "gain", None) if self.solver.extends else None
         self.dt = checks.duration("dt", dt)
@@ -198,6 +198,11 @@ class Controller:
         if self._waiting:
             self._clocks.tick(t, times, references, problem.equations, solution.u)
         return self.level.command(solution, references, state)
+
+    @property
+    def constraints(self) -> tuple[Constraint, ...]:
+        """The Cartesian constraints that are kept."""
+        return self._confining.constraints
 
     @property
     def singularity(self) -> Any:
@@ -321,7 +326,9 @@ def _clocked(asked: bool | None, tasks: Sequence[Task], slowed: bool, level: Lev
     return [bool(waits) for _ in tasks]
 
 
-def _checked_objective(objective: Objective | None, solver: Solver, robot: Robot) -> Objective | None:
+def _checked_objective(
+    objective: Objective | None, solver: Solver, robot: Robot, otherwise: str = "objective=None"
+) -> Objective | None:
     if objective is None:
         if solver.extends:
             raise ProblemError(
@@ -336,7 +343,7 @@ def _checked_objective(objective: Objective | None, solver: Solver, robot: Robot
     if "reference" not in solver.honours and not solver.extends:
         able = ", ".join(repr(s) for s in solvers_that_honour("reference"))
         raise UnsupportedProblem(
-            f"solver {solver.name!r} has no null-space term for an objective; use {able}, or objective=None"
+            f"solver {solver.name!r} has no null-space term for an objective; use {able}, or {otherwise}"
         )
     objective.check(robot)
     return objective
