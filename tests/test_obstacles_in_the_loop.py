@@ -205,7 +205,7 @@ def test_both_hands_of_talos_reach_without_touching() -> None:
 
 @pytest.mark.parametrize("x", [0.9, 1.2, 1.5])
 def test_accelerations_that_only_the_controller_knows_of_count(x):
-    """The robot's own limits hold none; joints at 3 rad/s that brake with 3 rad/s^2 need rows long before the margin."""
+    """The robot's own limits hold none; joints that brake with 3 rad/s^2 need rows long before the margin."""
     robot = cc.planar([1.0, 0.7, 0.4])
     assert np.isinf(robot.limits.acceleration_upper).all()
     limits = robot.limits.replace(
