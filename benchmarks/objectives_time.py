@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
-from harness import interleaved, save_rows, setting, show
+from harness import SHORT, interleaved, save_rows, setting, show
 from obstacles import ten_obstacles
 from step_time import REFERENCE, rows
 
@@ -35,9 +35,9 @@ def objectives(robot: cc.Robot) -> dict[str, cc.Objective]:
         "InverseCondition": cc.InverseCondition(tool),
         "VelocityRatio": cc.VelocityRatio(tool, along=along),
         "TorquePerForce": cc.TorquePerForce(tool, along=along),
-        "KineticEnergy": cc.KineticEnergy(np.linspace(0.5, 1.0, robot.nv)),
+        "KineticEnergy": cc.KineticEnergy(velocity=np.linspace(0.5, 1.0, robot.nv)),
         "GravityTorque": cc.GravityTorque(),
-        "TorqueDistribution": cc.TorqueDistribution(tool, wrench=load),
+        "TorqueDistribution": cc.TorqueDistribution(frame=tool, wrench=load),
         "Clearance, 10 obstacles": cc.Clearance(ten_obstacles()),
         "SelfClearance": cc.SelfClearance(),
         "WeightedSum of JointRange and Manipulability": 2.0 * cc.JointRange() + cc.Manipulability(tool),
@@ -70,7 +70,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--save", action="store_true", help=f"write {RESULTS.name}")
     save = parser.parse_args().save
-    found = rows(interleaved(candidates(), rounds=40, calls=100))
+    found = rows(interleaved(candidates(), **SHORT))
     show(f"Gradients on the Panda, 7 dof; ratio to {REFERENCE}", found)
     if save:
         save_rows(RESULTS, found, setting())
