@@ -201,24 +201,3 @@ def test_both_hands_of_talos_reach_without_touching() -> None:
             least[guarded].append(min(watch.margin - watch.excess(robot.state(q)) for q in run.q))
     assert min(least[True]) >= 0.009  # steps in which several rows contradict 20 rad/s^2 take 0.2 mm of the margin
     assert min(least[False]) < 0.0
-
-
-@pytest.mark.parametrize("x", [0.9, 1.2, 1.5])
-def test_accelerations_that_only_the_controller_knows_of_count(x):
-    """The robot's own limits hold none; joints that brake with 3 rad/s^2 need rows long before the margin."""
-    robot = cc.planar([1.0, 0.7, 0.4])
-    assert np.isinf(robot.limits.acceleration_upper).all()
-    limits = robot.limits.replace(
-        acceleration_lower=-3.0, acceleration_upper=3.0, velocity_lower=-3.0, velocity_upper=3.0
-    )
-    scene = cc.Scene().sphere("ball", 0.2, [x, -0.9, 0.0])
-    avoid = cc.Avoid(scene, 0.01, points={"tool": 0.05}, deceleration=1.0)
-    hand = cc.FrameTask("tool", "xy", gain=8.0, target=[x, -0.9, 0.0])
-    controller = cc.Controller(robot, hand, "sns", limits=limits, constraints=[avoid], dt=5e-3)
-    q, v = np.array([0.6, 0.4, 0.3]), np.zeros(3)
-    for k in range(400):
-        command = controller.step(q, v, 5e-3 * k)
-        assert command.solution.status is not cc.Status.INFEASIBLE
-        v = command.velocity
-        q = robot.integrate(q, 5e-3 * v)
-        assert avoid.excess(robot.state(q)) < 1e-9

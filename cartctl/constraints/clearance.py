@@ -76,9 +76,7 @@ class ClearanceConstraint(Constraint):
         limits = state.robot.limits
         centre, radius = spread(box, limits.velocity_lower, limits.velocity_upper, state.v)
         unknown = _unknown(box, limits.velocity_lower, limits.velocity_upper)
-        known = np.isfinite([limits.acceleration_lower, limits.acceleration_upper]).all()
-        # a controller may know of accelerations where the robot does not: then some joint cannot stop in this step
-        abrupt = box is None or not (known or (box.lower > 0.0).any() or (box.upper < 0.0).any())
+        abrupt = box is None or not np.isfinite([limits.acceleration_lower, limits.acceleration_upper]).all()
         rates = _around(centre, radius, unknown, state.v)
         return self._rows(state, dt, rates, 0.0, _NEAR if abrupt else np.inf)
 
