@@ -15,10 +15,12 @@ from rich.console import Console
 from rich.table import Table
 
 ROUNDS, CALLS = 60, 300
+# Rounds so short that a busy machine seldom interrupts one, each after calls that are not timed: for medians there.
+SHORT = {"rounds": 500, "calls": 8, "warm": 8}
 
 
 def interleaved(
-    functions: dict[str, Callable[[], object]], rounds: int = ROUNDS, calls: int = CALLS
+    functions: dict[str, Callable[[], object]], rounds: int = ROUNDS, calls: int = CALLS, warm: int = 0
 ) -> dict[str, list[float]]:
     """Us a call, one figure a round; all functions take their turn in every round."""
     times: dict[str, list[float]] = {name: [] for name in functions}
@@ -27,6 +29,8 @@ def interleaved(
             function()
     for _ in range(rounds):
         for name, function in functions.items():
+            for _ in range(warm):
+                function()
             start = perf_counter_ns()
             for _ in range(calls):
                 function()

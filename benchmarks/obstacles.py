@@ -19,7 +19,7 @@ from pathlib import Path
 import coal
 import numpy as np
 import pinocchio as pin
-from harness import interleaved, save_rows, setting, show
+from harness import SHORT, interleaved, save_rows, setting, show
 
 import cartctl as cc
 from cartctl.constraints import Box
@@ -76,7 +76,7 @@ def candidates() -> dict[str, Callable[[], object]]:
 
 def timed(save: bool) -> None:
     """The table of times."""
-    times = interleaved(candidates(), rounds=40, calls=100)
+    times = interleaved(candidates(), **SHORT)
     reference = times[REFERENCE]
     rows = [
         {

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
-from harness import interleaved, save_rows, setting, show
+from harness import SHORT, interleaved, save_rows, setting, show
 from step_time import REFERENCE, rows
 
 import cartctl as cc
@@ -59,7 +59,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--save", action="store_true", help=f"write {RESULTS.name}")
     save = parser.parse_args().save
-    found = rows(interleaved(candidates()))
+    found = rows(interleaved(candidates(), **SHORT))
     show(f"One step on the Panda, 7 dof, 6D pose; ratio to {REFERENCE}", found)
     if save:
         save_rows(RESULTS, found, setting())

@@ -1,9 +1,9 @@
 """Compiled kernels: plain array functions in the subset numba compiles, compiled when first used, cached on disk.
 
 A kernel stays in the file of its method, decorated with :func:`kernel`; importing it does not import numba. A large one
-is made of functions decorated with :func:`part`, which are compiled into it. The cache folder is keyed by a hash of the
-package's sources, because numba's own key misses changes in a callee of another file. With ``NUMBA_DISABLE_JIT=1`` the
-same functions run as Python.
+is made of functions decorated with :func:`part`, which are compiled into it; it may call other kernels, too. The cache
+folder is keyed by a hash of the package's sources, because numba's own key misses changes in a callee of another file.
+With ``NUMBA_DISABLE_JIT=1`` the same functions run as Python.
 """
 
 from __future__ import annotations
@@ -89,13 +89,16 @@ def part(function: Callable[P, R]) -> Part[P, R]:
 
 
 def _with_parts(function: Callable[P, R]) -> Callable[P, R]:
-    """``function`` with the parts among its globals as numba can call them."""
+    """``function`` with the parts and kernels among its globals as numba can call them.
+
+    A kernel is linked as it is, with its own signature: compiled once, whoever calls it.
+    """
     assert isinstance(function, FunctionType)
     known = function.__globals__
-    parts = {name: known[name] for name in function.__code__.co_names if isinstance(known.get(name), Part)}
+    parts = {name: known[name] for name in function.__code__.co_names if isinstance(known.get(name), Part | Kernel)}
     if not parts:
         return function
-    inner = {name: found.inner for name, found in parts.items()}
+    inner = {name: found.inner if isinstance(found, Part) else found.compiled for name, found in parts.items()}
     bound = FunctionType(function.__code__, known | inner, function.__name__, function.__defaults__)
     bound.__qualname__, bound.__module__ = function.__qualname__, function.__module__
     return bound

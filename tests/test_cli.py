@@ -18,10 +18,11 @@ from typer.testing import CliRunner, Result
 import cartctl as cc
 from cartctl.cli import files, hand, shapes
 from cartctl.cli.app import app
-from cartctl.cli.choices import OBJECTIVES, PATHS, PLANES
+from cartctl.cli.choices import OBJECTIVES, PATHS, PLANES, SINGULARITIES
 from cartctl.cli.console import number
 from cartctl.cli.probes import PACKAGES
 from cartctl.errors import ParameterError
+from cartctl.levels.singularity_policies import NAMED, as_policy
 from tests.interruptions import interrupt_at
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -188,6 +189,33 @@ def test_every_objective_by_name(arm: str, plain: None, name: str) -> None:
     assert run.meta["objective"].startswith(name.title().replace("-", "") + "(")
     assert "axes=" not in run.meta["objective"] or "axes='xy'" in run.meta["objective"]
     assert run.metrics().tasks[0].max_m < 1e-2
+
+
+def test_singularity_policies_by_name_are_those_of_the_controller() -> None:
+    assert tuple(NAMED) == SINGULARITIES
+    text = " ".join(cartctl("track", "--help").stdout.split())
+    assert "--singularity" in text and "--solver pinv --singularity damp" in text
+
+
+@pytest.mark.parametrize("name", SINGULARITIES)
+def test_every_singularity_policy_by_name(arm: str, plain: None, name: str) -> None:
+    result = cartctl("track", arm, *QUICK, "--singularity", name)
+    assert result.exit_code == 0, result.stdout
+    assert f"near a singularity: {name}" in " ".join(result.stdout.split())
+    run = cc.Run.load("out/three-circle-projected-gradient.npz")
+    assert run.meta["singularity"] == repr(as_policy(name))
+
+
+def test_compare_takes_a_singularity_policy_and_names_who_refuses_it(arm: str, plain: None) -> None:
+    result = cartctl("compare", arm, *QUICK, "--solvers", "pinv,projected-gradient", "--singularity", "avoid")
+    assert result.exit_code == 0, result.stdout
+    words = " ".join(result.stdout.split())
+    assert "near a singularity: avoid" in words and "another singularity policy" in words
+    assert Path("out/three-circle-projected-gradient.npz").exists()
+    both = cartctl("compare", arm, *QUICK, "--solvers", "pinv,dls", "--singularity", "damp")
+    assert both.exit_code == 0
+    for solver in ("pinv", "dls"):
+        assert cc.Run.load(f"out/three-circle-{solver}.npz").meta["singularity"] == repr(as_policy("damp"))
 
 
 @pytest.mark.parametrize(
@@ -359,6 +387,10 @@ def test_the_size_fits_the_robot(name: str, size: float) -> None:
         (["--objective-gain", "0"], "--objective-gain is 0"),
         (["--objective-gain", "3", "--objective", "none"], "there is no objective"),
         (["--objective", "jont-range"], "did you mean 'joint-range'?"),
+        (["--singularity", "dampen"], "did you mean 'damp'?"),
+        (["--singularity", ""], "singularity ''"),
+        (["--singularity", "slow-down", "--level", "acceleration"], "no velocities that could be slowed down"),
+        (["--singularity", "avoid", "--solver", "pinv"], "or another singularity policy"),
         (["--objective", "joint-range", "--solver", "pinv"], "no null-space term"),
         (["--solver", "projected-gradint"], "did you mean 'projected-gradient'"),
         (["--solver", "dls", "--damping", "nan"], "damping is nan"),

@@ -353,6 +353,9 @@ def test_bad_plants_are_refused():
         (lambda: cc.Plant(noise=-1.0), "noise"),
         (lambda: cc.Plant(seed=-1), "seed"),
         (lambda: cc.Plant(friction=1.0), "friction"),
+        (lambda: cc.Plant(payload=5), "payload is 5"),
+        (lambda: cc.Plant(payload=[cc.Payload(1.0), "brick"]), "payload"),
+        (lambda: cc.Plant(payload=None), "payload is None"),
     ):
         with pytest.raises(ParameterError, match=says):
             make()

@@ -56,9 +56,42 @@ def lines(axes: Any) -> dict[str, np.ndarray]:
     return {line.get_label(): np.asarray(line.get_ydata()) for line in axes.get_lines() if line.get_label()[0] != "_"}
 
 
+def driven(run: Run, rng: np.random.Generator) -> Run:
+    """Return the run with torques up to twice the limits of 10 N m upwards and 5 N m downwards."""
+    n = run.robot.nv
+    limits = {"torque_upper": np.full(n, 10.0), "torque_lower": np.full(n, -5.0)}
+    run.robot.limits = run.robot.limits.replace(**limits)
+    run.torque = rng.uniform(-10.0, 20.0, (len(run), n))
+    return run
+
+
 @pytest.fixture
 def rng() -> np.random.Generator:
     return np.random.default_rng(11)
+
+
+def test_torques_are_shares_of_the_limit_in_their_direction(rng: np.random.Generator) -> None:
+    robot = chain(4, rng)
+    kinematic = random_run(robot, rng)
+    assert not any(axes.get_title(loc="left").startswith("Joint torques") for axes in plot_run(kinematic).axes)
+    run = driven(random_run(robot, rng), rng)
+    axes = panel(plot_run(run), "Joint torques")
+    assert run.torque is not None
+    for i, name in enumerate(robot.dof_names):
+        share = np.where(run.torque[:, i] >= 0, run.torque[:, i] / 10.0, run.torque[:, i] / 5.0)
+        np.testing.assert_allclose(lines(axes)[name], share)
+        np.testing.assert_array_equal(axes.get_lines()[i].get_xdata(), run.time[:-1])
+    worst = np.abs(np.where(run.torque >= 0, run.torque / 10.0, run.torque / 5.0))
+    assert axes.get_title(loc="right").startswith(f"peak {100 * worst.max():.3g} %")
+
+
+def test_torques_without_limits_are_named_not_drawn(rng: np.random.Generator) -> None:
+    run = driven(random_run(chain(3, rng), rng), rng)
+    open_ended = np.array([np.inf, 10.0, 10.0])
+    run.robot.limits = run.robot.limits.replace(torque_upper=open_ended)
+    axes = panel(plot_run(run), "Joint torques")
+    assert set(lines(axes)) == set(run.robot.dof_names[1:])
+    assert "joint0" in axes.get_xlabel()
 
 
 def test_lines_are_the_runs_numbers(rng: np.random.Generator) -> None:

@@ -43,8 +43,38 @@ def test_frame_drift_is_the_classical_acceleration(name: str, seed: int) -> None
 
 
 @pytest.mark.parametrize("seed", range(3))
+def test_frame_drift_is_pinocchios(name: str, seed: int) -> None:
+    """Which gets there by its recursion over the bodies, and not from the columns of the Jacobian."""
+    robot, rng = ROBOTS[name](), np.random.default_rng(10 + seed)
+    state, data = random_state(robot, rng), robot.model.createData()
+    pin.forwardKinematics(robot.model, data, state.q, state.v, np.zeros(robot.nv))
+    for frame in robot.frame_names:
+        world = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+        theirs = pin.getFrameClassicalAcceleration(robot.model, data, robot.frame_id(frame), world).vector
+        np.testing.assert_allclose(state.drift(frame), theirs, atol=1e-12 * (1 + state.v @ state.v))
+
+
+def test_another_velocity_at_the_same_place(name: str) -> None:
+    """What depends on v is worked out anew, what does not is kept."""
+    robot, rng = ROBOTS[name](), np.random.default_rng(11)
+    state, other = random_state(robot, rng), rng.normal(size=robot.nv)
+    J, M = state.jacobian(robot.tool), state.mass_matrix
+    looked_at = ("nonlinear_effects", "com_drift")
+    for quantity in looked_at:
+        getattr(state, quantity)
+    state.drift(robot.tool)
+    state.turn(other)
+    fresh = robot.state(state.q, other)
+    for quantity in looked_at:
+        np.testing.assert_allclose(getattr(state, quantity), getattr(fresh, quantity), atol=1e-12 * (1 + other @ other))
+    np.testing.assert_array_equal(state.drift(robot.tool), fresh.drift(robot.tool))
+    np.testing.assert_allclose(state.twist(robot.tool), J @ other, atol=1e-12)
+    assert state.jacobian(robot.tool) is J and state.mass_matrix is M
+
+
+@pytest.mark.parametrize("seed", range(3))
 def test_kinematic_hessian(name: str, seed: int) -> None:
-    """By differences, and against the drift, which Pinocchio works out another way: J_dot v = (H v) v."""
+    """By differences, and against the drift: J_dot v = (H v) v."""
     robot, rng = ROBOTS[name](), np.random.default_rng(seed)
     state = random_state(robot, rng)
     for frame in {robot.tool, *rng.choice(robot.frame_names[1:], 2)}:

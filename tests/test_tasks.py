@@ -68,6 +68,26 @@ def test_jacobian_and_drift_by_finite_differences(name: str, k: int) -> None:
     np.testing.assert_allclose(task.drift(state), difference, atol=loose * (1 + state.v @ state.v))
 
 
+@pytest.mark.parametrize("name", list(ROBOTS))
+@pytest.mark.parametrize("k", range(14))
+def test_curvatures_are_drifts_along_other_velocities(name: str, k: int) -> None:
+    """All at once, or one by one; the state comes back as it was."""
+    robot, rng = ROBOTS[name](), np.random.default_rng(7 * k + len(name))
+    tool = robot.tool
+    more = [cc.FrameTask(tool, expressed_in=tool), cc.FrameTask(tool, "rx z", orientation="XYZ")]
+    task = [*tasks_of(robot), *more][k]
+    task.check(robot)
+    state = random_state(robot, rng)
+    before = np.array(task.drift(state))
+    V = rng.normal(size=(4, robot.nv))
+    curvatures = task.curvatures(state, V)
+    assert curvatures.shape == (len(task.units(robot)), 4)
+    for column, v in zip(curvatures.T, V, strict=True):
+        alone = task.drift(robot.state(state.q, v))
+        np.testing.assert_allclose(column, alone, atol=1e-10 * (1.0 + v @ v) * (1.0 + np.abs(alone).max(initial=0.0)))
+    np.testing.assert_array_equal(task.drift(state), before)
+
+
 @pytest.mark.parametrize("sequence", EULER_SEQUENCES)
 def test_euler_rates_through_the_analytic_jacobian(sequence: str) -> None:
     robot = panda()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from enum import Enum
 from typing import Any, Protocol
 
@@ -80,6 +80,7 @@ class Solution:
 
     __slots__ = (
         "_method",
+        "_problem",
         "_residuals",
         "_saturated",
         "_saturated_rows",
@@ -88,7 +89,6 @@ class Solution:
         "_task_part",
         "guarded",
         "lost_rank",
-        "problem",
         "recovering",
         "solver",
         "u",
@@ -98,7 +98,7 @@ class Solution:
 
     def __init__(
         self,
-        problem: Problem,
+        problem: Problem | Callable[[], Problem],
         u: FloatArray,
         solver: str,
         method: Method | None = None,
@@ -106,7 +106,7 @@ class Solution:
         lost_rank: bool = False,
         scales: FloatArray | None = None,
     ) -> None:
-        self.problem = problem
+        self._problem = problem
         self.u = u
         self.solver = solver
         self.lost_rank = lost_rank
@@ -121,6 +121,14 @@ class Solution:
         self._saturated_rows: NDArray[np.int8] | None = None
         self._residuals: FloatArray | None = None
         self._task_part: FloatArray | None = None
+
+    @property
+    def problem(self) -> Problem:
+        """What was answered; a hot loop may leave it to be put together when somebody asks."""
+        problem = self._problem
+        if not isinstance(problem, Problem):
+            problem = self._problem = problem()
+        return problem
 
     @property
     def scales(self) -> FloatArray:

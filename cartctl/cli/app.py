@@ -42,7 +42,8 @@ def cartctl(
 
 app.command(
     epilog="Example:  cartctl track panda --path circle --radius 0.1 --open\n\n"
-    "Example:  cartctl track my_robot.urdf --frame gripper --axes position --solver dls"
+    "Example:  cartctl track my_robot.urdf --frame gripper --axes position --solver dls\n\n"
+    "Example:  cartctl track ur5 --solver pinv --singularity damp"
 )(track)
 app.command(
     epilog="Example:  cartctl compare panda\n\n"

@@ -9,6 +9,7 @@ from cartctl.errors import LookupFailure, ParameterError
 PATHS = ("circle", "line", "ellipse", "lissajous", "polygon")
 PLANES = ("xy", "xz", "yz", "yx", "zx", "zy")
 METRICS = ("identity", "inertia", "joint-limits", "inverse-inertia", "inverse-inertia-squared")
+SINGULARITIES = ("truncate", "damp", "slow-down", "avoid", "halt")
 OBJECTIVES = (
     "joint-range",
     "posture",

@@ -38,6 +38,7 @@ def compare(
     damping: options.Damping = None,
     objective: options.ObjectiveName = None,
     objective_gain: options.ObjectiveGain = None,
+    singularity: options.Singularity = None,
     dt: options.Step = 1e-3,
     duration: options.Duration = None,
     out_dir: options.OutDir = Path("out"),
@@ -58,7 +59,7 @@ def compare(
         course = Course(
             Place(robot, package_dir, root_joint, home, frame, axes),
             Way(path, plane, size, period, laps),
-            Pace(level, metric, gain, dt, duration),
+            Pace(level, metric, gain, dt, duration, singularity),
         )
         contest = Contest(course, method.solver_list(solver or (), damping), goal)
         place = files.Files(out_dir, course.robot.name, path, "compare")

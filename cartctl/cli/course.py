@@ -8,7 +8,7 @@ from pathlib import Path as FilePath
 
 import cartctl as cc
 from cartctl import checks
-from cartctl.cli.choices import posture
+from cartctl.cli.choices import SINGULARITIES, choice, posture
 from cartctl.cli.console import say
 from cartctl.cli.hand import Hand
 from cartctl.cli.method import limit_options
@@ -46,13 +46,17 @@ class Way:
 
 @dataclass(frozen=True)
 class Pace:
-    """The options that tell how it is followed: level, metric, gain in 1/s, step in s, duration in s."""
+    """The options that tell how it is followed.
+
+    level, metric; gain in 1/s, step and duration in s; what becomes of it near a singularity.
+    """
 
     level: str
     metric: str | None
     gain: float
     dt: float
     duration: float | None
+    singularity: str | None = None
 
 
 class Course:
@@ -76,6 +80,8 @@ class Course:
             )
         self.shape = Shape.fitting(self.hand, self.axes, way.kind, way.plane, way.size, way.period, way.laps)
         self._chosen = place.axes is None and self.axes != "pose"
+        if pace.singularity is not None:
+            choice("singularity", pace.singularity, SINGULARITIES)
         self._pace = pace
         target = self.shape.path(self.hand)
         self.task = cc.FrameTask(self.hand.frame, axes=self.axes, gain=pace.gain, target=target)
@@ -87,7 +93,7 @@ class Course:
         pace = self._pace
         return cc.Controller(
             self.robot, self.task, solver, pace.level, objective=objective, metric=self._metric(solver), dt=pace.dt,
-            soft_start=_SOFT_START, **limit_options(solver, pace.level),
+            soft_start=_SOFT_START, singularity=pace.singularity, **limit_options(solver, pace.level),
         )  # fmt: skip
 
     def _metric(self, solver: cc.Solver) -> str | None:
@@ -107,10 +113,11 @@ class Course:
         ]
 
     def pace(self) -> str:
-        """Level, metric, gain and step."""
+        """Level, metric, gain, step, and the policy near singularities."""
         weighed = self._pace.metric or (_TORQUE_METRIC if self._pace.level == "torque" else None)
         metric = f", metric {weighed}" if weighed else ""
-        return f"{self._pace.level} level{metric}, gain {self.task.gain:g} 1/s, step {1e3 * self._pace.dt:g} ms"
+        near = f", near a singularity: {self._pace.singularity}" if self._pace.singularity else ""
+        return f"{self._pace.level} level{metric}, gain {self.task.gain:g} 1/s, step {1e3 * self._pace.dt:g} ms{near}"
 
     @property
     def spare(self) -> int:

@@ -7,7 +7,17 @@ from typing import Annotated
 
 import typer
 
-from cartctl.cli.choices import METRICS, OBJECTIVES, PATHS, PLANES, completion, robots, solver_names, words
+from cartctl.cli.choices import (
+    METRICS,
+    OBJECTIVES,
+    PATHS,
+    PLANES,
+    SINGULARITIES,
+    completion,
+    robots,
+    solver_names,
+    words,
+)
 
 _HAND, _PATH, _METHOD, _RESULT = "The robot", "The path", "The method", "The result"
 
@@ -123,6 +133,14 @@ ObjectiveGain = Annotated[
         metavar="K",
         rich_help_panel=_METHOD,
         help="How strongly; by default 100 for joint-range, 10 for manipulability, the header says it.",
+    ),
+]  # fmt: skip
+Singularity = Annotated[
+    str | None,
+    typer.Option(
+        "--singularity", metavar="NAME", rich_help_panel=_METHOD, autocompletion=words(SINGULARITIES),
+        help=f"What becomes of the task near a singularity: {', '.join(SINGULARITIES)}; by default the solver's own "
+        "business. Example: --solver pinv --singularity damp",
     ),
 ]  # fmt: skip
 Step = Annotated[float, typer.Option("--dt", metavar="S", rich_help_panel=_METHOD, help="Time step in s.")]

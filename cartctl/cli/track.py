@@ -38,6 +38,7 @@ def track(
     damping: options.Damping = None,
     objective: options.ObjectiveName = None,
     objective_gain: options.ObjectiveGain = None,
+    singularity: options.Singularity = None,
     dt: options.Step = 1e-3,
     duration: options.Duration = None,
     out_dir: options.OutDir = Path("out"),
@@ -57,7 +58,7 @@ def track(
         course = Course(
             Place(robot, package_dir, root_joint, home, frame, axes),
             Way(path, plane, size, period, laps),
-            Pace(level, metric, gain, dt, duration),
+            Pace(level, metric, gain, dt, duration, singularity),
         )
         controller = course.controller(how, aimed(purpose.objective, course.hand.frame, course.axes))
         place = files.Files(out_dir, course.robot.name, path, how.name)

@@ -112,7 +112,7 @@ class AccelerationLevel(Level):
         """``u0 = -k grad H - D v`` (nv,), None where there is neither; otherwise: D where none was chosen."""
         D = otherwise if self.damping is None else self.damping
         checks.fits("damping", D, state.robot.nv)
-        braking = -D * state.v if np.any(D) else None
+        braking = -D * state.v if (D if isinstance(D, float) else D.any()) else None
         if secondary.objective is None:
             return braking
         u0 = secondary.share * direction(secondary.objective, state)

@@ -30,7 +30,7 @@ import numpy as np
 
 from cartctl.algebra.svd import scale
 from cartctl.checks import FloatArray
-from cartctl.levels.approach_kernel import ASKED, BEND, FORWARD, PULL, ROWS, SIGMA, SLOWING, directions, hold
+from cartctl.levels.approach_kernel import ASKED, BEND, FORWARD, ROWS, SIGMA, SLOWING, bend, directions, hold
 from cartctl.levels.calming import Above
 from cartctl.model.limits import Limits
 from cartctl.model.state import State
@@ -87,7 +87,6 @@ class Approach:
         self,
         limits: Limits,
         dt: float,
-        scratch: State,
         solver: Solver,
         waiting: Iterable[Task] = (),
     ) -> None:
@@ -96,11 +95,11 @@ class Approach:
         speed = np.minimum(limits.velocity_upper, -limits.velocity_lower)
         still = _AT_REST * np.where(np.isfinite(speed), speed, 1.0)
         self._joints = np.array([slowing, speed, still])
-        self._dt, self._scratch, self._scales = dt, scratch, solver.scales
+        self._dt, self._scales = dt, solver.scales
         self._bent: dict[int, FloatArray] = {}  # by task: the motion inwards, when it was last clear
         self._above = Above(ranked=not solver.stacks)
         self._walls = Walls(_NOTHING, _NOTHING, np.zeros((0, 0)), _NOTHING, _NOTHING)
-        self._directions, self._hold = directions.compiled, hold.compiled
+        self._directions, self._bend, self._hold = directions.compiled, bend.compiled, hold.compiled
 
     def begin(
         self,
@@ -145,15 +144,12 @@ class Approach:
         k = min(m, n)
         U, Vt, D = np.empty((m, k)), np.empty((k, n)), np.empty((ROWS, k))
         rate, error = _NOTHING if reference.rate is None else reference.rate, reference.error
-        walls = (
-            self._walls if reference.rate is None else self._walls.box()
-        )  # one stops before a wall, and slides along it
+        walls = self._walls if reference.rate is None else self._walls.box()  # before a wall one stops, or slides on
         bounded = walls.lower.shape[0] > 0
         self._directions(J, b, y, rate, error, self._joints, *walls, self._dt, size, bounded, U, Vt, D)
-        for i in np.flatnonzero(D[ASKED]):
-            self._scratch.set(state.q, Vt[i], state.time)
-            h = task.drift(self._scratch)
-            D[BEND, i], D[PULL, i] = U[:, i] @ h, max(0.0, -float(error @ h))
+        asked = np.flatnonzero(D[ASKED])
+        if asked.shape[0]:
+            self._bend(error, U, asked, task.curvatures(state, Vt if asked.shape[0] == k else Vt[asked]), D)
         return Directions(U, Vt, D, size)
 
     def _pace(self, task: Task, state: State, found: Directions, reference: Reference) -> float:
@@ -165,8 +161,7 @@ class Approach:
         assert rate is not None and acceleration is not None
         s = found.D[SIGMA]
         solve = (found.Vt.T * (s / (s * s + (_CLEAR * found.size) ** 2))) @ found.U.T
-        self._scratch.set(state.q, solve @ rate, state.time)
-        bend = np.abs(solve @ (acceleration - task.drift(self._scratch)))
+        bend = np.abs(solve @ (acceleration - task.curvatures(state, (solve @ rate)[None])[:, 0]))
         with np.errstate(divide="ignore"):
             room = float(np.min(self._joints[SLOWING] / bend))
         return min(1.0, math.sqrt(_BENDS * room))

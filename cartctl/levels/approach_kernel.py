@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from cartctl.braking import clamp, fastest
-from cartctl.checks import FloatArray
+from cartctl.checks import FloatArray, IntArray
 from cartctl.kernels import kernel, part
 from cartctl.levels.left_out import leave_out
 
@@ -104,6 +104,17 @@ def _matters(d: FloatArray, feedback: float, far: float, size: float, dt: float)
     return bool(total > _NOTICED * most)
 
 
+@kernel("void(vector, matrix, ints, matrix, out_matrix)")
+def bend(error: FloatArray, U: FloatArray, asked: IntArray, H: FloatArray, D: FloatArray) -> None:
+    """Note the curvatures of the directions asked (k,), columns of H (m, k), and the pull of the error along them."""
+    for j in range(asked.shape[0]):
+        k, along, pull = asked[j], 0.0, 0.0
+        for i in range(error.shape[0]):
+            along += U[i, k] * H[i, j]
+            pull -= error[i] * H[i, j]
+        D[BEND, k], D[PULL, k] = along, max(0.0, pull)
+
+
 @kernel("float(vector, matrix, matrix, float, float, bool, out_vector)")
 def hold(b: FloatArray, U: FloatArray, D: FloatArray, dt: float, size: float, scales: bool, out: FloatArray) -> float:
     """Fill out (m,) with what of b the robot can still stop; the speed of joints left to what ranks below."""
@@ -136,8 +147,8 @@ def steer(
 ) -> float:
     """Fill out (m,) with what of the next velocity y, reached by acceleration, can still be stopped; the calm left.
 
-    D[FEEDBACK] is the velocity wanted, which y follows at the rate ``2 gain`` (m,): held back where the way is too
-    short, and y itself at the edge, and where the pull of a target out of reach would make the loop ring.
+    D[FEEDBACK] is the velocity wanted, which y follows at the rate ``2 gain``, (m,) or (1,): held back where the way is
+    too short, and y itself at the edge, and where the pull of a target out of reach would make the loop ring.
     """
     calm, held, allowed = np.inf, False, np.zeros(D.shape[1])
     asked = D[NEXT].copy()
@@ -146,7 +157,7 @@ def steer(
         if d[SIGMA] > _NOTHING * size:
             most, following, k_d = _stoppable(d, d[PULL], dt), asked[k], 0.0
             for i in range(y.shape[0]):
-                k_d += 2.0 * gain[i] * U[i, k] * U[i, k]
+                k_d += 2.0 * (gain[i] if gain.shape[0] > 1 else gain[0]) * U[i, k] * U[i, k]
             following += dt * k_d * (clamp(d[FEEDBACK], -most, most) - d[FEEDBACK])
             if d[PULL] > _STIFF * d[SIGMA] * d[SIGMA]:
                 most = min(most, _newton(d, dt))

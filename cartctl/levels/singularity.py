@@ -42,7 +42,7 @@ class Guard:
                 "singularity='damp', 'avoid' or 'halt', or level 'velocity'"
             )
         self.waits = isinstance(self.policy, SlowDown | Halt)  # whether a path had better wait for the hand
-        self._acts = self.policy is not None and not isinstance(self.policy, AvoidSingularity)
+        self.acts = self.policy is not None and not isinstance(self.policy, AvoidSingularity)  # on commands
         self._robot = robot
         self.reset()
 
@@ -59,7 +59,7 @@ class Guard:
 
     def guard(self, problem: Problem, state: State) -> Guarded:
         """The problem with the commands that the policy leaves."""
-        if not self._acts:
+        if not self.acts:
             return Guarded(problem)
         equations, acted = list(problem.equations), False
         for k, task in enumerate(self._tasks):

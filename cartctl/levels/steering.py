@@ -21,6 +21,7 @@ from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
+import pinocchio as pin
 
 from cartctl.checks import FloatArray
 from cartctl.levels.approach import Approach
@@ -46,13 +47,12 @@ class Steering(Approach):
         self,
         limits: Limits,
         dt: float,
-        scratch: State,
         solver: Solver,
         waiting: Iterable[Task] = (),
     ) -> None:
-        super().__init__(limits, dt, scratch, solver, waiting)
+        super().__init__(limits, dt, solver, waiting)
+        self._point: State | None = None  # the control point
         self._takes_reference = "reference" in solver.honours
-        self._at = State(scratch.robot)  # the control point
         self._steer = steer.compiled
 
     def begin(
@@ -64,14 +64,17 @@ class Steering(Approach):
     ) -> None:
         """Begin a step at ``state`` under a box and rows on the acceleration."""
         dt, v = self._dt, state.v
-        self._at.set(state.robot.integrate(state.q, 0.5 * dt * v), v, state.time)
+        if self._point is None or self._point.robot is not state.robot:
+            self._point = State(state.robot)
+        at = self._at = self._point
+        at.set(pin.integrate(at.robot.model, state.q, 0.5 * dt * v), v, state.time)
         if rows is not None:
             C, c_lower, c_upper = rows
             begun = C @ v
             rows = C, begun + dt * c_lower, begun + dt * c_upper
         low = None if lower is None else v + dt * lower
         high = None if upper is None else v + dt * upper
-        super().begin(self._at, low, high, rows)
+        super().begin(at, low, high, rows)
 
     def steered(self, task: Task, t: float, anchor: Any, given: Steered) -> Steered:
         """What a task asks for at time t: ``given`` (of the state itself), or velocities held back at p."""
@@ -84,23 +87,23 @@ class Steering(Approach):
             held, edge = self._held_back(task, task.reference(at, t, anchor), J, y)
         held = self._above.calmed(J, held)
         self._above.add(J, held, edge)
-        return given if held is y or np.array_equal(held, y) else Steered(J, held / dt, Jv / dt)
+        return given if held is y or held.tolist() == y.tolist() else Steered(J, held / dt, Jv / dt)
 
     def _held_back(self, task: Task, reference: Reference, J: FloatArray, y: FloatArray) -> tuple[FloatArray, float]:
-        gain = np.full(y.shape, task.gain) if isinstance(task.gain, float) else task.gain
-        wanted = 0.5 * gain * reference.error
+        wanted = (0.5 * task.gain) * reference.error
         if reference.rate is not None:
             wanted = wanted + reference.rate
         U, _, D, size = self._along(task, self._at, J, reference, wanted, y)
         out = np.empty(y.shape)
-        edge = self._steer(y, gain, U, D, self._dt, size, self._scales, out)
+        edge = self._steer(y, np.atleast_1d(task.gain), U, D, self._dt, size, self._scales, out)
         return out, edge
 
     def damping(self, tasks: Sequence[Task]) -> float:
         """``D = 2 k`` in 1/s, at most what stops within a step; 0 for a solver that takes no reference."""
         if not self._takes_reference:
             return 0.0
-        return min(2.0 * max(float(np.max(task.gain, initial=0.0)) for task in tasks), 1.0 / self._dt)
+        gains = [k if isinstance(k, float) else float(k.max(initial=0.0)) for k in (task.gain for task in tasks)]
+        return min(2.0 * max(gains), 1.0 / self._dt)
 
     def calm_reference(self, u0: FloatArray, v: FloatArray) -> FloatArray:
         """``u0`` (nv,) such that ``v + u0 dt``, wanted of the null space, is no faster than the tasks leave to it."""

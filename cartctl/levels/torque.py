@@ -53,8 +53,8 @@ class TorqueLevel(Level):
     damped. Damping needs a solver that honours a reference. None means 0 where the solver takes none, else 20 1/s, or
     ``D_i = min(3 N m s/rad + 10 M_ii /s, 300 M_ii /s)``, which a step of some ms can follow at light joints, too.
 
-    Torque bounds are a box; position, velocity and acceleration limits rows ``C = M^-1``; they yield in the order of
-    :mod:`cartctl.levels.yielding`.
+    Torque bounds are a box; position, velocity and acceleration limits rows ``C = M^-1``, near them those of the middle
+    of the step (:mod:`cartctl.levels.midway`); they yield in the order of :mod:`cartctl.levels.yielding`.
 
     Raises ParameterError, NonFiniteError; ShapeError, FrameNotFound, UnderactuatedRobot when a controller is made.
     """
@@ -72,7 +72,7 @@ class TorqueLevel(Level):
         friction: Friction | None = None,
         wrenches: Wrench | Sequence[Wrench] = (),
     ) -> None:
-        self.damping = None if damping is None else checks.amounts("damping", damping, checks.PER_SECOND)
+        self.damping = None if damping is None else checks.amounts("damping", damping)
         self._damps = damping is not None and bool(np.any(self.damping))
         self.loads: Loads = Loads(friction, wrenches)
         self._motion = AccelerationLevel()
@@ -101,7 +101,7 @@ class TorqueLevel(Level):
         """The problem of this instant, and the references it was made from; raises NonFiniteError, ShapeError."""
         lower, upper, outside, _, torque = confines
         M = state.mass_matrix  # before the Jacobians, which come along
-        J, rest, sizes, references = self._asked(state, tasks, times, anchors)
+        J, rest, sizes, references = self.asked(state, tasks, times, anchors)
         h = self.loads.effects(state)
         low, high = (_NONE, _NONE) if lower is None or upper is None else (lower, upper)
         (m, nv), r = J.shape, low.shape[0]
@@ -121,7 +121,7 @@ class TorqueLevel(Level):
         least, most = (None, None) if torque is None else torque
         return Problem.trusted(tuple(equations), metric, u0, least, most, blocks), references
 
-    def _asked(
+    def asked(
         self,
         state: State,
         tasks: Sequence[Task],

@@ -15,6 +15,7 @@ from cartctl.levels.base import Secondary, direction
 from cartctl.model.state import State
 
 DAMPING = 20.0  # 1/s
+FIRM, STIFF, STIFFEST = 3.0, 10.0, 300.0  # N m s/rad, 1/s, 1/s
 MAPPED = ("inverse-inertia", "inverse-inertia-squared")  # the metrics of inertia
 
 
@@ -38,4 +39,4 @@ def drawn_to(
 
 def of_inertia(inertia: FloatArray) -> FloatArray:
     """D in N m s/rad for joints of these inertias: enough for the heavy ones, not too stiff for the light ones."""
-    return np.minimum(3.0 + 10.0 * inertia, 300.0 * inertia)
+    return np.minimum(FIRM + STIFF * inertia, STIFFEST * inertia)

@@ -11,7 +11,7 @@ import pinocchio as pin
 from cartctl import checks
 from cartctl.checks import FloatArray
 from cartctl.errors import ConfigurationError, FrameNotFound, JointNotFound, ParameterError
-from cartctl.model.hessian import carried
+from cartctl.model.hessian import carried, order_of
 from cartctl.model.limits import Limits
 from cartctl.model.payload import Payload, carrying
 from cartctl.model.state import State
@@ -28,8 +28,8 @@ class Robot:
     one dof. continuous: (nv,) which turn without end. single: (nv,) which are a joint of their own, and not of a moving
     base. dof_names: (nv,) one name a tangent coordinate. limits: Limits, (nv,) each. home: (nq,) a posture away from
     singularities. tool: the name of the tool frame. mimics: whether joints mimic others. carried: (nv, nv), whether dof
-    i carries the axis of dof j, as [i, j]. spec: what :func:`cartctl.load` needs to load it again, None for a model of
-    your own.
+    i carries the axis of dof j, as [i, j]: where ``order[i] <= order[j]``, order (nv,). spec: what :func:`cartctl.load`
+    needs to load it again, None for a model of your own.
 
     Raises FrameNotFound, JointNotFound.
     """
@@ -67,7 +67,8 @@ class Robot:
         for name in self.single_joints:
             self.single[self._joints[name].idx_v] = True
         self.mimics = len(model.mimicking_joints) > 0
-        self.carried = carried(model)
+        self.order = order_of(model)
+        self.carried = carried(self.order)
         self._plain = all(j.nq == j.nv for j in self._joints.values())
         self.neutral = _read_only(pin.neutral(model))
         self.has_plain_coordinates = self._plain and not self.neutral.any()  # q itself is comparable with the limits

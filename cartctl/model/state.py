@@ -9,7 +9,7 @@ import pinocchio as pin
 
 from cartctl.checks import FloatArray
 from cartctl.model.differences import central
-from cartctl.model.hessian import kinematic_hessian
+from cartctl.model.hessian import jacobian_drift, jacobian_drifts, kinematic_hessian
 
 if TYPE_CHECKING:
     from cartctl.model.robot import Robot
@@ -33,7 +33,6 @@ class State:
     """
 
     __slots__ = (
-        "_accelerated",
         "_cache",
         "_data",
         "_frames",
@@ -41,7 +40,7 @@ class State:
         "_kinematics",
         "_model",
         "_poses",
-        "_rest",
+        "_rates",
         "q",
         "robot",
         "stamp",
@@ -55,8 +54,7 @@ class State:
         self._data = robot.model.createData()
         self._frames: dict[str, FrameView] = {}
         self._joints: list[tuple[FloatArray, FloatArray]] = []
-        self.stamp = 0
-        self._rest = np.zeros(robot.nv)
+        self.stamp = self._rates = 0
         self.set(robot.neutral, np.zeros(robot.nv))
 
     def set(self, q: FloatArray, v: FloatArray, time: float = 0.0) -> None:
@@ -65,9 +63,16 @@ class State:
         self.v = v
         self.time = time
         self.stamp += 1
+        self._rates += 1
         self._kinematics = False
-        self._accelerated = False
         self._cache: dict[str, FloatArray] = {}
+
+    def turn(self, v: FloatArray) -> None:
+        """Take another velocity, already checked, where it is: what depends on q alone stays; for such loops, too."""
+        self.v = v
+        self._rates += 1
+        self._cache.pop("h", None)
+        self._cache.pop("com drift", None)
 
     def place(self, frame: str) -> FrameView:
         """Views of ``frame``'s pose that change with the next ``set``; :meth:`placement` copies."""
@@ -140,15 +145,30 @@ class State:
 
     def drift(self, frame: str) -> FloatArray:
         """``J_dot v``, (6,): the classical acceleration of ``frame`` at zero joint acceleration, m/s^2 and rad/s^2."""
-        key = "drift " + frame
-        if key not in self._cache:
-            fid = self.robot.frame_id(frame)
-            if not self._accelerated:
-                pin.forwardKinematics(self._model, self._data, self.q, self.v, self._rest)
-                self._accelerated = True
-            motion = pin.getFrameClassicalAcceleration(self._model, self._data, fid, _WORLD_ALIGNED)
-            self._cache[key] = _frozen(motion.vector)
-        return self._cache[key]
+        view = self.place(frame)
+        if view.accelerated != self._rates:
+            if self.robot.mimics:
+                pin.forwardKinematics(self._model, self._data, self.q, self.v, np.zeros(self._model.nv))
+                motion = pin.getFrameClassicalAcceleration(self._model, self._data, view.fid, _WORLD_ALIGNED)
+                view.drift = np.array(motion.vector)
+            else:
+                view.drift = np.empty(6)
+                jacobian_drift.compiled(self.jacobian(frame), self.v, self.robot.order, view.drift)
+            view.drift.flags.writeable = False
+            view.accelerated = self._rates
+        return view.drift
+
+    def drifts(self, frame: str, V: FloatArray) -> FloatArray:
+        """``J_dot(v_i) v_i`` for every row v_i of V (k, nv), as columns, (6, k)."""
+        drifts = np.empty((6, V.shape[0]))
+        if self.robot.mimics:
+            own = State(self.robot)
+            for i, v in enumerate(V):
+                own.set(self.q, v, self.time)
+                drifts[:, i] = own.drift(frame)
+        else:
+            jacobian_drifts.compiled(self.jacobian(frame), V, self.robot.order, drifts)
+        return drifts
 
     def hessian(self, frame: str) -> FloatArray:
         """``dJ_aj / dq_i``, (6, nv, nv) as [a, j, i]: how :meth:`jacobian` changes along each tangent coordinate.
@@ -191,7 +211,6 @@ class State:
         """``dg_j / dq_i``, (nv, nv) as [j, i], N m/rad; with mimic joints, central differences."""
         if self.robot.mimics:
             return self._once("dg", lambda: central(self, lambda s: s.gravity))
-        self._accelerated = False  # overwritten by what follows
         return self._once(
             "dg", lambda: _square(pin.computeGeneralizedGravityDerivatives(self._model, self._data, self.q))
         )
@@ -200,7 +219,6 @@ class State:
         """``d(M(q) a)_j / dq_i`` of a constant a (nv,), (nv, nv) as [j, i]; with mimic joints, central differences."""
         if self.robot.mimics:
             return central(self, lambda s: s.mass_matrix @ a)
-        self._accelerated = False  # overwritten by what follows
         at_rest = np.zeros(self._model.nv)
         turned = pin.computeRNEADerivatives(self._model, self._data, self.q, at_rest, a)[0]
         return _square(np.array(turned)) - self.gravity_gradient
@@ -231,9 +249,19 @@ class State:
 
 
 class FrameView:
-    """One frame inside a State's data: its pose as views of Pinocchio's memory, and its Jacobian."""
+    """One frame inside a State's data: its pose as views of Pinocchio's memory, its Jacobian and drift."""
 
-    __slots__ = ("differentiated", "fid", "jacobian", "placed", "pose", "rotation", "translation")
+    __slots__ = (
+        "accelerated",
+        "differentiated",
+        "drift",
+        "fid",
+        "jacobian",
+        "placed",
+        "pose",
+        "rotation",
+        "translation",
+    )
 
     def __init__(self, data: pin.Data, fid: int) -> None:
         self.fid = fid
@@ -241,7 +269,8 @@ class FrameView:
         self.translation: FloatArray = self.pose.translation
         self.rotation: FloatArray = self.pose.rotation
         self.jacobian: FloatArray = np.zeros((6, 0))
-        self.placed = self.differentiated = -1
+        self.drift: FloatArray = np.zeros(6)
+        self.placed = self.differentiated = self.accelerated = -1
 
 
 def _frozen(array: Any) -> FloatArray:

@@ -14,6 +14,7 @@ from cartctl.levels.approach import Approach
 from cartctl.levels.base import UNCONFINED, Confines
 from cartctl.levels.bounds import JointBounds
 from cartctl.levels.loads import actuated
+from cartctl.levels.midway import Midway
 from cartctl.levels.torque_bounds import torque_box
 from cartctl.levels.yielding import Layer, Widened, intervals, widened
 from cartctl.model.limits import Limits
@@ -55,14 +56,22 @@ class Confining:
             else:
                 _warn_of_rows(solver, level)
             if approach and level.approaching is not None:
-                self._approach = level.approaching(limits, dt, State(robot), solver, waiting)
+                self._approach = level.approaching(limits, dt, solver, waiting)
         elif joints or jerk:
             what = "disabled" if joints else "jerk"
             raise ParameterError(f"{what} is given without limits; expected limits= for it to be a part of")
         self.yields = level.limits_are_rows or self._torque is not None
         self.recovering = False
+        self.midway: Midway | None = None  # where bounds are on what u comes to
+        if level.limits_are_rows and self._bounds is not None:
+            self.midway = Midway(level, dt, State(robot))
         self._now = UNCONFINED
         self._coordinates = _itself if robot.has_plain_coordinates else robot.coordinates
+
+    @property
+    def constraints(self) -> tuple[Constraint, ...]:
+        """The Cartesian constraints."""
+        return self._constraints
 
     def reset(self) -> None:
         """Forget the previous step."""
@@ -73,26 +82,25 @@ class Confining:
 
     def at(self, state: State) -> Confines:
         """What confines u at a state."""
-        if self._bounds is None:
-            self.recovering = False
-            box = None
-        else:
+        lower = upper = rows = approach = None
+        self.recovering = False
+        if self._bounds is not None:
             lower, upper, self.recovering = self._bounds(self._coordinates(state.q), state.v)
-            box = Box(lower, upper)
-        rows = None
+            approach = self._approach
         if self._constraints:
+            box = None if lower is None or upper is None else Box(lower, upper)
             blocks = stacked([self._level.rows(c, state, self._dt, box) for c in self._constraints])
             rows = None if blocks is None else (blocks.C, blocks.lower, blocks.upper)
-        if box is None:
-            self._now = Confines(None, None, rows, None, self._torque)
-        else:
-            self._now = Confines(box.lower, box.upper, rows, self._approach, self._torque)
+        self._now = Confines(lower, upper, rows, approach, self._torque)
         return self._now
 
-    def widened(self, problem: Problem, state: State) -> Widened:
-        """The problem of the state :meth:`at` was last asked about, with limits that exclude each other widened."""
+    def widened(self, problem: Problem, state: State, at: State | None = None) -> Widened:
+        """The problem of the state :meth:`at` was last asked about, with limits that exclude each other widened.
+
+        at: where M and h are taken from, if not from there.
+        """
         lower, upper, rows, _, torque = self._now
-        T, t, S, s = self._level.motion(state)
+        T, t, S, s = self._level.motion(at or state)
         layers = []
         if self._bounds is not None and lower is not None and upper is not None:
             q = self._coordinates(state.q)
@@ -105,13 +113,13 @@ class Confining:
             return widened(problem, layers, torque)
         return widened(problem, layers, Layer("torque", S, torque.lower - s, torque.upper - s))
 
-    def stopping(self, problem: Problem, state: State) -> FloatArray:
+    def stopping(self, problem: Problem, state: State, at: State | None = None) -> FloatArray:
         """The u that comes nearest to stopping within the step, inside all bounds of the problem, (n,)."""
-        u = self._level.stopping(state, self._dt)
         if not self.yields:
-            return u
-        T = self._level.motion(state).T  # nearest in terms of accelerations, not of torques
-        braking = Equation(T, T @ u, fit="least_squares", name="stop")
+            return self._level.stopping(state, self._dt)
+        T, t, _, _ = self._level.motion(at or state)
+        # nearest in terms of accelerations, not of torques
+        braking = Equation(T, -state.v / self._dt - t, fit="least_squares", name="stop")
         nearest = Problem((braking,), problem.lower, problem.upper, problem.constraints)
         for solver in ("hqp", "qp"):
             stopped = solve(nearest, solver)

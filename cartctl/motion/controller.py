@@ -16,8 +16,12 @@ from cartctl.checks import LARGEST, FloatArray, is_moderate
 from cartctl.constraints import Constraint
 from cartctl.errors import CartctlWarning, NoTasksError, ParameterError, ProblemError, UnsupportedProblem
 from cartctl.levels import Command, Level, Secondary, get_level
+from cartctl.levels.base import Confines
 from cartctl.levels.metrics import as_state_metric
+from cartctl.levels.midway import ROUNDS, Midway
 from cartctl.levels.singularity import Guard
+from cartctl.levels.torque import TorqueLevel
+from cartctl.levels.torque_fused import FusedTorque, fuses
 from cartctl.levels.yielding import missed
 from cartctl.model.limits import Limits
 from cartctl.model.robot import Robot
@@ -89,7 +93,7 @@ class Controller:
         self._guard = Guard(singularity, self.level, robot, self.tasks)
         self.objective = self._guard.objective(_checked_objective(objective, self.solver, robot))
         if self.objective is not objective:
-            _checked_objective(self.objective, self.solver, robot)
+            _checked_objective(self.objective, self.solver, robot, "another singularity policy")
         self.metric = metric
         self._extend = getattr(self.solver, "gain", None) if self.solver.extends else None
         self.dt = checks.duration("dt", dt)
@@ -99,6 +103,7 @@ class Controller:
         self._weighing = metric if isinstance(metric, str) else "identity" if metric is None else ""
         self._alone = self._secondary(0.0)
         self.solver.prepare()
+        self._fused = self._fused_way()
         self._constraints, self._disabled, self._jerk, self._approach = constraints, disabled, jerk, approach
         clocked = _clocked(path_clock, self.tasks, self.solver.scales or self._guard.waits, self.level)
         self._clocks = PathClocks(clocked)
@@ -136,6 +141,14 @@ class Controller:
         given = (self._constraints, self._disabled, self._jerk, self._approach)
         return Confining(self.robot, self.level, self.solver, limits, *given, self.dt, self._waiting)
 
+    def _fused_way(self) -> FusedTorque | None:
+        """Level and solver in one, where there is such a way for them; else they are asked one after the other."""
+        if self._guard.acts or not isinstance(self.level, TorqueLevel):
+            return None
+        if not fuses(self.level, self.solver, self._metric):
+            return None
+        return FusedTorque(self.level, self.solver, self.tasks, self.robot.nv)
+
     def times(self, t: float) -> list[float]:
         """Each task's own time when everybody else's is t: later by what its path has waited."""
         return self._clocks.times(t)
@@ -165,15 +178,31 @@ class Controller:
         secondary = self._alone if self.objective is None else self._secondary(t - started)
         times = self._clocks.times(t)
         confines = self._confining.at(state)
-        problem, references = self.level.problem(state, self.tasks, times, anchors, secondary, metric, confines)
-        left, guarded, halted = self._guard.guard(problem, state)
-        solution = self._halt(left, state) if halted else self._solve(left, state)
+        midway, found = self._confining.midway, None
+        if self._fused is not None:
+            found = self._fused.answer(state, times, anchors, secondary, confines, self._last)
+        if found is None:
+            problem, references = self.level.problem(state, self.tasks, times, anchors, secondary, metric, confines)
+            left, guarded, halted = self._guard.guard(problem, state)
+            solution = self._halt(left, state) if halted else self._solve(left, state, self._last)
+            close = midway is not None and not halted and midway.concerns(left, solution.u)
+        else:
+            solution, references, close = found
+            solution.recovering, guarded, left = self._confining.recovering, False, None
+        if close and midway is not None:
+            solution = self._over_the_step(midway, left, solution, state, confines)
         solution.guarded = guarded
         self._anchors, self._started = anchors, started  # only now: a refused step leaves no trace
         self._last = solution
         self.step_times = times
-        self._clocks.tick(t, times, references, problem.equations, solution.u)
+        if self._waiting:
+            self._clocks.tick(t, times, references, problem.equations, solution.u)
         return self.level.command(solution, references, state)
+
+    @property
+    def constraints(self) -> tuple[Constraint, ...]:
+        """The Cartesian constraints that are kept."""
+        return self._confining.constraints
 
     @property
     def singularity(self) -> Any:
@@ -193,22 +222,37 @@ class Controller:
         solution.recovering = self._confining.recovering
         return solution
 
-    def _solve(self, problem: Problem, state: State) -> Solution:
-        """The solver's answer, from the last one; where limits exclude each other they yield in their order.
+    def _over_the_step(
+        self, midway: Midway, problem: Problem | None, solution: Solution, state: State, confines: Confines
+    ) -> Solution:
+        """The answer that keeps the bounds over the step, and not only at its beginning; None: its own problem."""
+        for k in range(ROUNDS):
+            blocks = midway.better(solution.u, state, confines, again=k > 0)
+            if blocks is None:
+                break
+            p = problem = problem or solution.problem
+            bounds = (p.lower, p.upper, blocks)
+            p = Problem.trusted(p.equations, p.metric, p.reference, *bounds)
+            solution = self._solve(p, state, solution, midway.state)
+        return solution
 
-        A task with no feasible scale is slowed towards standing still.
+    def _solve(self, problem: Problem, state: State, start: Solution | None, at: State | None = None) -> Solution:
+        """The solver's answer, from an earlier one; where limits exclude each other they yield in their order.
+
+        A task with no feasible scale is slowed towards standing still. at: where M and h are taken from, if not from
+        the state.
         """
-        solution = self.solver.solve(problem, self._last)
+        solution = self.solver.solve(problem, start)
         yielded: tuple[str, ...] = ()
         if problem.constraints is not None and missed(solution):
             yielded = ("constraints",)
             if self._confining.yields:
-                problem, best, yielded = self._confining.widened(problem, state)
+                problem, best, yielded = self._confining.widened(problem, state, at)
                 solution = self.solver.solve(problem)
                 if missed(solution):
                     solution = Solution(problem, best, self.solver.name, status=Status.INFEASIBLE)
         if _skipped(solution) or (self._confining.yields and solution.failed):
-            stopping = self._confining.stopping(problem, state)
+            stopping = self._confining.stopping(problem, state, at)
             again = towards_rest(problem, ~(solution.scales == 1.0), stopping)
             solution = self.solver.solve(again, solution)
             if self._confining.yields and (_skipped(solution) or solution.failed):
@@ -282,7 +326,9 @@ def _clocked(asked: bool | None, tasks: Sequence[Task], slowed: bool, level: Lev
     return [bool(waits) for _ in tasks]
 
 
-def _checked_objective(objective: Objective | None, solver: Solver, robot: Robot) -> Objective | None:
+def _checked_objective(
+    objective: Objective | None, solver: Solver, robot: Robot, otherwise: str = "objective=None"
+) -> Objective | None:
     if objective is None:
         if solver.extends:
             raise ProblemError(
@@ -297,7 +343,7 @@ def _checked_objective(objective: Objective | None, solver: Solver, robot: Robot
     if "reference" not in solver.honours and not solver.extends:
         able = ", ".join(repr(s) for s in solvers_that_honour("reference"))
         raise UnsupportedProblem(
-            f"solver {solver.name!r} has no null-space term for an objective; use {able}, or objective=None"
+            f"solver {solver.name!r} has no null-space term for an objective; use {able}, or {otherwise}"
         )
     objective.check(robot)
     return objective

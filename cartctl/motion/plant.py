@@ -45,7 +45,10 @@ class Plant:
         if not (robot is None or isinstance(robot, Robot)):
             raise ParameterError(f"robot is a {type(robot).__name__}; expected a Robot from cc.load(...), or None")
         self.robot = robot
-        self.payloads = (payload,) if isinstance(payload, Payload) else tuple(payload)
+        given = (payload,) if isinstance(payload, Payload) else payload
+        if not isinstance(given, Sequence) or not all(isinstance(load, Payload) for load in given):
+            raise ParameterError(f"payload is {payload!r}; expected cc.Payload(...), or a sequence of them")
+        self.payloads = tuple(given)
         self.masses = checks.number("masses", masses, low=0.0, strict=True)
         self.loads = Loads(friction, wrenches)
         self.noise = checks.amounts("noise", noise, "standard deviations of at least 0")

@@ -16,6 +16,7 @@ from cartctl.levels import Command
 from cartctl.motion.controller import Controller
 from cartctl.motion.mover import Driven, Mover
 from cartctl.motion.run import Run, TaskRecord
+from cartctl.motion.surroundings import Surroundings
 
 
 class Recorder:
@@ -31,6 +32,7 @@ class Recorder:
         self._q, self._v = np.zeros((steps + 1, robot.nq)), np.zeros((steps + 1, robot.nv))
         self._command, self._spent = np.zeros((steps, robot.nv)), np.zeros(steps)
         self._status: list[str] = []
+        self._around = Surroundings(controller)
         self._tasks = [_TaskRows(task.units(robot), robot.nv, steps) for task in controller.tasks]
 
     def time_of(self, k: int) -> float:
@@ -43,7 +45,8 @@ class Recorder:
         self._command[k], self._spent[k] = command.told, spent * 1e-9
         self._status.append(command.solution.status.name)
         solution, controller = command.solution, self._controller
-        state = controller.observe(q, v)
+        state = controller.observe(q, v, self.time_of(k))
+        self._around.see(state)
         times = controller.step_times
         for i, (rows, task) in enumerate(zip(self._tasks, controller.tasks, strict=True)):
             rows.error[k] = command.references[i].error
@@ -58,6 +61,7 @@ class Recorder:
         self._q[k], self._v[k] = q, v
         t = self.time_of(k)
         state = controller.observe(q, v, t)
+        self._around.see(state)
         times = controller.times(t)
         for rows, task, anchor, own in zip(self._tasks, controller.tasks, controller.anchors, times, strict=True):
             rows.error[k] = task.reference(state, own, anchor).error
@@ -83,6 +87,7 @@ class Recorder:
             tasks=records,
             torque=None if driven is None else driven.torque[:n].copy(),
             energy=None if driven is None else driven.books.first(samples),
+            obstacles=self._around.records(samples),
             robot=controller.robot,
         )
 

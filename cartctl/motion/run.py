@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from cartctl.motion.metrics import Metrics
+    from cartctl.motion.surroundings import ObstacleRecord
 
 
 @dataclass(eq=False)
@@ -46,8 +48,8 @@ class Run:
     time (N+1,) s, q (N+1, nq), v (N+1, nv): the states, the last one after the last step. command (N, nv): what the
     level commands, velocities (rad/s, m/s), accelerations (rad/s^2, m/s^2) or torques (N m, N), by ``meta["level"]``.
     status (N,), solve_time (N,) s: one a step. tasks: a TaskRecord each. torque (N, nv): what drove the plant, N m or
-    N, and energy: EnergyBooks of N+1 samples; None for a kinematic run. meta: robot, solver and its parameters, level,
-    dt, date, versions, ``interrupted``.
+    N, and energy: EnergyBooks of N+1 samples; None for a kinematic run. obstacles: an ObstacleRecord of each that the
+    controller minds. meta: robot, solver and its parameters, level, dt, date, versions, ``interrupted``.
     """
 
     def __init__(
@@ -63,11 +65,12 @@ class Run:
         tasks: list[TaskRecord],
         torque: FloatArray | None = None,
         energy: EnergyBooks | None = None,
+        obstacles: Sequence[ObstacleRecord] = (),
         robot: Robot | None = None,
     ) -> None:
         self.meta, self.time, self.q, self.v = meta, time, q, v
         self.command, self.status, self.solve_time, self.tasks = command, status, solve_time, tasks
-        self.torque, self.energy = torque, energy
+        self.torque, self.energy, self.obstacles = torque, energy, list(obstacles)
         self._robot = robot
 
     @property
@@ -123,7 +126,7 @@ class Run:
         return to_parquet(self, Path(path))
 
     def plot(self, path: str | os.PathLike[str] | None = None) -> Figure:
-        """A figure of errors, joints, rates, singular values and step time; written to ``path`` if given."""
+        """A figure of errors, joints, rates, torques, singular values and step time; written to ``path`` if given."""
         from cartctl.report import plot_run
 
         figure = plot_run(self)

@@ -14,9 +14,11 @@ from cartctl.errors import ParameterError, RunFileError
 from cartctl.files import whole_file
 from cartctl.motion.energy import EnergyBooks
 from cartctl.motion.run import Run, TaskRecord
+from cartctl.motion.surroundings import ObstacleRecord
 
 _FORMAT = 1
 _ARRAYS = ("time", "q", "v", "command", "solve_time")
+_OBSTACLE_ARRAYS = ("points", "sizes", "radii", "pose")
 _TASK_ARRAYS = ("error", "scale", "singular_values", "pose", "target")
 
 
@@ -41,6 +43,9 @@ def save(run: Run, path: Path) -> Path:
         arrays["torque"] = run.torque
     if run.energy is not None:
         arrays.update({f"energy_{f.name}": getattr(run.energy, f.name) for f in fields(EnergyBooks)})
+    header["obstacles"] = [{"name": record.name, "plane": record.plane} for record in run.obstacles]
+    for i, record in enumerate(run.obstacles):
+        arrays.update({f"obstacle{i}_{n}": getattr(record, n) for n in _OBSTACLE_ARRAYS})
     arrays["header"] = np.array(json.dumps(header))
     with whole_file(path) as part, part.open("wb") as file:
         np.savez_compressed(file, **arrays)
@@ -58,13 +63,15 @@ def load(path: Path) -> Run:
         tasks = [_task(i, entry, arrays) for i, entry in enumerate(header["tasks"])]
         status = [header["status"][code] for code in arrays["status"]]
         books = [arrays[f"energy_{f.name}"] for f in fields(EnergyBooks) if f"energy_{f.name}" in arrays]
-        _check(arrays, tasks, path, books)
+        around = [_obstacle(i, entry, arrays) for i, entry in enumerate(header.get("obstacles", []))]
+        _check(arrays, tasks, path, books, around)
         return Run(
             meta=header["meta"],
             status=status,
             tasks=tasks,
             torque=arrays.get("torque"),
             energy=EnergyBooks(*books) if books else None,
+            obstacles=around,
             **{n: arrays[n] for n in _ARRAYS},
         )
     except FileNotFoundError:
@@ -82,11 +89,18 @@ def _task(i: int, entry: dict[str, Any], arrays: dict[str, Any]) -> TaskRecord:
     return TaskRecord(**entry, **values)
 
 
-def _check(arrays: dict[str, Any], tasks: list[TaskRecord], path: Path, books: list[Any]) -> None:
+def _obstacle(i: int, entry: dict[str, Any], arrays: dict[str, Any]) -> ObstacleRecord:
+    return ObstacleRecord(**entry, **{n: arrays[f"obstacle{i}_{n}"] for n in _OBSTACLE_ARRAYS})
+
+
+def _check(
+    arrays: dict[str, Any], tasks: list[TaskRecord], path: Path, books: list[Any], around: list[ObstacleRecord]
+) -> None:
     """One length throughout and nothing but finite numbers; raises RunFileError."""
     samples, steps = len(arrays["time"]), len(arrays["command"])
     per_sample = [arrays[n] for n in ("time", "q", "v")]
     per_sample += books
+    per_sample += [o.pose for o in around if len(o.pose) != 1]
     per_sample += [a for t in tasks for a in (t.error, t.singular_values, t.pose, t.target) if a is not None]
     per_step = [arrays["command"], arrays["solve_time"], arrays["status"], *(t.scale for t in tasks)]
     torques = [arrays["torque"]] if "torque" in arrays else []
@@ -94,6 +108,9 @@ def _check(arrays: dict[str, Any], tasks: list[TaskRecord], path: Path, books: l
     lengths = {len(a) for a in per_sample} == {samples} and {len(a) for a in per_step} == {steps}
     if not lengths or samples not in (steps + 1, 0):
         raise RunFileError(f"{path} holds arrays that do not belong together; expected N + 1 samples of N steps")
+    placed = [x for o in around for x in (o.pose, o.points, o.radii)]
     scales = [np.nan_to_num(t.scale, nan=0.0) for t in tasks]  # nan where a task was skipped
-    if not all(np.isfinite(a).all() for a in [*per_sample, arrays["command"], arrays["solve_time"], *torques, *scales]):
+    if not all(
+        np.isfinite(a).all() for a in [*per_sample, arrays["command"], arrays["solve_time"], *torques, *scales, *placed]
+    ):
         raise RunFileError(f"{path} holds nan or inf; expected the finite numbers that Run.save writes")

@@ -53,7 +53,8 @@ def assemble(runs: Sequence[Run], words: Words, colors: Sequence[str] = COLORS[:
     return Template(_own("page.html")).substitute(
         policy=_policy(viewer, player), version=escape(_version()), style=_own("page.css"),
         title=escape(words.title), heading=words.heading, subtitle=escape(words.subtitle),
-        caption=words.caption + (_legend(words.traced) if scene.records else ""), below=words.below,
+        caption=words.caption + _legend(words.traced if scene.records else None, len(scene.obstacles)),
+        below=words.below,
         kind="several" if len(runs) > 1 else "single",
         scene=data, viewer=viewer, player=player, licences=escape(_licences()),
     )  # fmt: skip
@@ -64,9 +65,15 @@ def breakable(name: str) -> str:
     return escape(name).replace("_", "_<wbr>")
 
 
-def _legend(traced: str) -> str:
-    """Return the key to what is drawn beside the robot."""
-    entries = [("dot desired", "target"), ("desired", "desired path")] + [("traced", traced)] * bool(traced)
+def _legend(traced: str | None, obstacles: int) -> str:
+    """Return the key to what is drawn beside the robot; traced: None where no task has a place in the world."""
+    entries = []
+    if traced is not None:
+        entries = [("dot desired", "target"), ("desired", "desired path")] + [("traced", traced)] * bool(traced)
+    if obstacles:
+        entries.append(("dot obstacle", "obstacle" if obstacles == 1 else "obstacles"))
+    if not entries:
+        return ""
     return "<ul>" + "".join(f'<li class="{kind}">{escape(text)}</li>' for kind, text in entries) + "</ul>"
 
 

@@ -75,6 +75,25 @@ def speed(run: Run) -> tuple[NDArray[np.bool_], Array]:
     return limited, run.v[:, limited] / bound[:, limited]
 
 
+def torques(axes: Any, run: Run, joints: Sequence[Pen]) -> None:
+    """Draw the torque that drove each joint, over its limit in that direction; held from sample to sample."""
+    assert run.torque is not None
+    limits, torque = run.robot.limits, run.torque
+    bound = np.where(torque >= 0, limits.torque_upper, -limits.torque_lower)
+    limited = np.isfinite(limits.torque_upper - limits.torque_lower) & (bound > 0).all(axis=0)
+    share = torque[:, limited] / bound[:, limited]
+    for k, i in enumerate(np.flatnonzero(limited).tolist()):
+        line(axes, run.time[: len(share)], share[:, k], joints[i])
+    finish(axes, "Joint torques", "fraction of limit")
+    if share.size:
+        ratio = np.abs(share)
+        if ratio.max() > 0.4:
+            mark_limits(axes, -1.0, 1.0)
+        hardest = run.robot.dof_names[np.flatnonzero(limited)[int(ratio.max(axis=0).argmax())]]
+        note(axes, f"peak {100 * ratio.max():.3g} % ({plain(hardest)})")
+    _absent(axes, run, limited, "torque limits")
+
+
 def singular_values(axes: Any, run: Run) -> None:
     """Draw each task's singular values, the smallest one strong."""
     records = [r for r in run.tasks if r.singular_values.size]

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 def plot_run(run: Run) -> Figure:
-    """Return a figure of ``run``: errors, joint positions and rates, singular values, step times.
+    """Return a figure of ``run``: errors, joint positions, rates, torques if it has any, singular values, step times.
 
     It belongs to no window and leaves matplotlib's global state alone. Raises ParameterError for a run without a
     sample.
@@ -25,15 +25,18 @@ def plot_run(run: Run) -> Figure:
     if not len(run.time):
         raise ParameterError("the run holds no sample; expected one that was simulated for at least a step")
     units = [unit for unit in panels.MARKED if any(unit in record.units for record in run.tasks)]
-    figure = Figure(figsize=(11.0, 8.8 if len(units) < 3 else 11.2), layout="constrained")
+    rows = _rows(len(units), run.torque is not None)
+    figure = Figure(figsize=(11.0, 1.6 + 2.4 * len(rows)), layout="constrained")
     figure.suptitle(_title(run), fontsize=12, fontweight="bold", x=0.01, ha="left")
     joints = pens(run.robot.dof_names, panels.urgency(run))
-    rows = _rows(len(units))
     places: dict[str, Any] = figure.subplot_mosaic(rows, sharex=True)
     for k, unit in enumerate(units):
         panels.error(places[f"error {k}"], run, unit)
     panels.positions(places["positions"], run, joints)
     panels.rates(places["rates"], run, joints)
+    if run.torque is not None:
+        panels.torques(places["torques"], run, joints)
+        places["torques"].tick_params(labelbottom=True)  # as wide as two: its ticks are not those of the row below
     panels.singular_values(places["singular values"], run)
     panels.step_time(places["step time"], run)
     for name in rows[-1]:
@@ -43,11 +46,12 @@ def plot_run(run: Run) -> Figure:
     return figure
 
 
-def _rows(errors: int) -> list[list[str]]:
-    """Return the names of the panels, two a row; an error panel without a neighbour has the row to itself."""
+def _rows(errors: int, driven: bool) -> list[list[str]]:
+    """Return the names of the panels, two a row; a panel without a neighbour has the row to itself."""
     names = [f"error {k}" for k in range(errors)]
     pairs = [names[k : k + 2] for k in range(0, errors, 2)]
-    below = [["positions", "rates"], ["singular values", "step time"]]
+    middle = [["positions", "rates"], *([["torques", "torques"]] if driven else [])]
+    below = [*middle, ["singular values", "step time"]]
     return [pair * 2 if len(pair) == 1 else pair for pair in pairs] + below
 
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from cartctl.report import surroundings
 from cartctl.report.actor import DESIRED, NEUTRAL, Actor
 from cartctl.report.bodies import bodies
 from cartctl.report.palette import COLORS
@@ -41,7 +42,9 @@ class Scene:
         ]
         self.records = self.actors[0].records
         reached = np.concatenate([actor.seen(self.bodies) for actor in self.actors])
-        points = np.concatenate([reached, *(path for actor in self.actors for path in actor.paths())])
+        self.obstacles = runs[0].obstacles
+        paths = [path for actor in self.actors for path in actor.paths()]
+        points = np.concatenate([reached, *paths, surroundings.seen(self.obstacles, reached)])
         self.stage = Stage(points, floor=min(float(reached[:, 2].min()), 0.0), low=len(runs) > 1)
 
     def draw(self) -> None:
@@ -49,6 +52,9 @@ class Scene:
         size = self.stage.size
         self.stage.draw(self.visualizer)
         desired = DESIRED if len(self.actors) == 1 else NEUTRAL
+        surroundings.draw(
+            self.visualizer["obstacles"], self.timeline, self.obstacles, self.actors[0].shown, self.stage.size
+        )
         owners: list[Any] = []
         for actor in self.actors:
             node = self.visualizer[f"run{actor.rank}"] if len(self.actors) > 1 else self.visualizer

@@ -98,6 +98,18 @@ class Task(ABC):
     def drift(self, state: State) -> FloatArray:
         """``J_dot v`` (m,)."""
 
+    def curvatures(self, state: State, V: FloatArray) -> FloatArray:
+        """``J_dot(v_i) v_i`` for every row v_i of V (k, nv), as columns, (m, k); the state comes back as it was."""
+        v = state.v
+        try:
+            columns = []
+            for along in V:
+                state.turn(along)
+                columns.append(self.drift(state))
+        finally:
+            state.turn(v)
+        return np.stack(columns, axis=1)
+
     @abstractmethod
     def reference(self, state: State, t: float, anchor: Any) -> Reference:
         """Error and target rates at time t; ``anchor`` is what :meth:`anchor` said at the first step."""

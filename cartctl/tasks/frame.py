@@ -76,6 +76,12 @@ class FrameTask(PoseTask):
         """``J_dot v`` (6,), turned into the chosen axes: the projection of a vector equation, not a derivative."""
         return self._turn(state, state.drift(self._frame))
 
+    def curvatures(self, state: State, V: FloatArray) -> FloatArray:
+        """All at once, but for Euler angles."""
+        if self._euler and self._angular:
+            return super().curvatures(state, V)
+        return self._select(self._turn(state, state.drifts(self._frame, V)))
+
     def _turn(self, state: State, rows: FloatArray) -> FloatArray:
         if not self._turned:
             return rows
