@@ -42,7 +42,8 @@ MAY_IMPORT = {
     "files": {"errors"},
     "motion": JOINED | {"files"},
     "report": JOINED | {"files", "motion"},
-    "cli": JOINED | {"analysis", "files", "motion", "report"},
+    "bench": JOINED | {"files", "motion", "report"},
+    "cli": JOINED | {"analysis", "bench", "files", "motion", "report"},
     "__main__": {"cli"},
 }
 # The one named exception: Run.plot and Run.html.

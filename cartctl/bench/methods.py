@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Mapping
-from dataclasses import MISSING, dataclass, fields, is_dataclass
+from dataclasses import MISSING, Field, dataclass, fields, is_dataclass
+from typing import Any
 
 from cartctl.bench.peers import peers
 from cartctl.errors import LookupFailure, ParameterError
@@ -67,11 +68,8 @@ def _by_name(name: str) -> Method:
     if name not in solvers():
         raise MethodNotFound(name, [*solvers(), *peers(), "all", "peers"])
     kind = solver_class(name)
-    needed = [
-        f.name
-        for f in (fields(kind) if is_dataclass(kind) else ())
-        if f.init and f.default is MISSING and f.default_factory is MISSING
-    ]
+    parameters: tuple[Field[Any], ...] = fields(kind) if is_dataclass(kind) else ()
+    needed = [f.name for f in parameters if f.init and f.default is MISSING and f.default_factory is MISSING]
     if needed:
         raise ParameterError(
             f"solver {name!r} needs {', '.join(needed)}; give an instance, as in cc.bench.run(..., solvers={{...}})"

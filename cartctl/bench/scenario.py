@@ -76,9 +76,7 @@ class Scenario:
         """A scenario of the keys of a file; raises ScenarioError for unknown and missing ones."""
         given = Fields(table)
         needed = {"name", "robot", "tasks", "duration"}
-        values = {
-            name: given.take(name, lambda _, value: value) for name in _CHECKS if name in needed or name in given
-        }
+        values = {name: given.take(name, lambda _, value: value) for name in _CHECKS if name in needed or name in given}
         for name in _CHECKS:  # so that a misspelt key finds its neighbour
             given.take(name, lambda _, value: value, None)
         given.end()
@@ -87,7 +85,7 @@ class Scenario:
     def to_dict(self) -> dict[str, Any]:
         """The keys that are not at their defaults, as a file would have them."""
         given = json.loads(json.dumps(asdict(self)))
-        defaults = {
+        defaults: dict[str, Any] = {
             each.name: [] if each.name in _LISTS else {} if each.name == "plant" else each.default
             for each in fields(self)
         } | {"levels": ["velocity"]}
@@ -106,7 +104,9 @@ _LISTS = ("scene", "constraints", "package_dirs")
 def _tables(check: Any, least: int = 0) -> Any:
     def checked(name: str, value: Any) -> tuple[dict[str, Any], ...]:
         if isinstance(value, (str, Mapping)) or not isinstance(value, Sequence) or len(value) < least:
-            raise ScenarioError(f"{name} is {value!r:.60}; expected a list of {'at least one table' if least else 'tables'}")
+            raise ScenarioError(
+                f"{name} is {value!r:.60}; expected a list of {'at least one table' if least else 'tables'}"
+            )
         made = []
         for i, each in enumerate(value):
             with under(i):

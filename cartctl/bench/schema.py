@@ -69,7 +69,9 @@ COLUMNS = (
     Column("flips", "whole", "", "reversals of a joint's rate", "low", 1.0),
     Column("power_above_3hz", "number", "", "share of the rates' power above 3 Hz", "low", 1e-6),
     Column("drift", "number", "rad or m", "largest joint distance between the ends of a lap", "low", 1e-6),
-    Column("null_motion", "number", "rad or m", "length of the joints' way in the first task's null space", "low", 1e-6),
+    Column(
+        "null_motion", "number", "rad or m", "length of the joints' way in the first task's null space", "low", 1e-6
+    ),
     Column("step_p50", "number", "s", "median time of a step", "low", 1e-7),
     Column("step_p99", "number", "s", "its 99th percentile", "low", 1e-7),
     Column("status", "counts", "", "steps by status"),
@@ -103,7 +105,5 @@ def arrow() -> Any:
         "tasks": pa.list_(task),
         "counts": pa.list_(pa.struct([("status", pa.string()), ("steps", pa.int64())])),
     }
-    described = [
-        pa.field(c.name, kinds[c.kind], metadata={"unit": c.unit, "says": c.says}) for c in COLUMNS
-    ]
+    described = [pa.field(c.name, kinds[c.kind], metadata={"unit": c.unit, "says": c.says}) for c in COLUMNS]
     return pa.schema(described, metadata={"cartctl.bench.schema": str(VERSION)})

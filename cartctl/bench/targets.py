@@ -11,7 +11,6 @@ from cartctl import paths
 from cartctl.checks import FloatArray
 
 
-
 def make_target(spec: dict[str, Any], start: pin.SE3, *, turns: bool) -> Any:
     """The target of ``spec`` for a frame at ``start``; turns: whether the task has an orientation to keep.
 

@@ -25,7 +25,8 @@ _TOKEN = re.compile(
 def parse(content: str, name: str) -> dict[str, Any]:
     """The values; raises ScenarioError naming the line of what is no TOML."""
     try:
-        return tomllib.loads(content)
+        table: dict[str, Any] = tomllib.loads(content)
+        return table
     except tomllib.TOMLDecodeError as error:
         found = re.search(r"\(at line (\d+), column (\d+)\)", str(error))
         end = content.count("\n") + 1

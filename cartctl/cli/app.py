@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 
 from cartctl import __version__
+from cartctl.cli.bench import app as bench
 from cartctl.cli.compare import compare
 from cartctl.cli.doctor import doctor
 from cartctl.cli.info import info
@@ -47,5 +48,6 @@ app.command(
     epilog="Example:  cartctl compare panda\n\n"
     "Example:  cartctl compare panda --solvers pinv,projected-gradient,extended-jacobian --laps 5 --open"
 )(compare)
+app.add_typer(bench, name="bench", epilog="Example:  cartctl bench run --scenarios arms --workers 2")
 app.command(epilog="Example:  cartctl info panda")(info)
 app.command(epilog="Example:  cartctl doctor")(doctor)

@@ -12,14 +12,19 @@ from __future__ import annotations
 import importlib.util
 import os
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from cartctl.errors import ParameterError
 
+if TYPE_CHECKING:
+    from cartctl.bench.building import Stage
+    from cartctl.motion.run import Run
+
 _HERE = Path(__file__).parent
+_RTB = "roboticstoolbox"
 
 
-class PeerUnavailable(ParameterError):
+class PeerUnavailable(ParameterError):  # noqa: N818 - names what the peer is
     """A peer is not installed, or cannot do what a scenario asks."""
 
 
@@ -55,7 +60,7 @@ def peers() -> dict[str, Peer]:
     """All peers by name, installed or not; raises ParameterError for a CARTCTL_PEERS that cannot be read."""
     known = [
         Peer("pink", _HERE / "pink_peer.py", "pink", "pip install pin-pink"),
-        Peer("roboticstoolbox", _HERE / "roboticstoolbox_peer.py", "roboticstoolbox", "pip install roboticstoolbox-python"),
+        Peer(_RTB, _HERE / f"{_RTB}_peer.py", _RTB, "pip install roboticstoolbox-python"),
         Peer("placo", _HERE / "placo_peer.py", "placo", "pip install placo (in an environment of its own)"),
     ]  # fmt: skip
     for entry in filter(None, os.environ.get("CARTCTL_PEERS", "").split(",")):
@@ -66,7 +71,7 @@ def peers() -> dict[str, Peer]:
     return {peer.name: peer for peer in known}
 
 
-def roll(name: str, stage: object, level: str) -> object:
+def roll(name: str, stage: Stage, level: str) -> Run:
     """The Run of a peer: see :mod:`cartctl.bench.peers.rollout`."""
     from cartctl.bench.peers import rollout
 

@@ -15,8 +15,8 @@ import numpy as np
 
 def roll(request: dict[str, Any]) -> dict[str, Any]:
     """Follow the targets by a FrameTask, a posture of cost 1e-3 below if asked for, DAQP, all limits that it knows."""
-    import pinocchio as pin
     import pink
+    import pinocchio as pin
     from pink.limits import AccelerationLimit, ConfigurationLimit, VelocityLimit
     from pink.tasks import FrameTask, PostureTask
 

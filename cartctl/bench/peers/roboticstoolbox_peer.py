@@ -64,7 +64,7 @@ def _chain(rtb: Any, request: dict[str, Any]) -> tuple[Any, list[int], Any]:
 
 
 def _pose(target: list[float]) -> Any:
-    """x y z qx qy qz qw as (4, 4)."""
+    """The pose (4, 4) of x y z qx qy qz qw."""
     x, y, z, w = target[3:]
     pose = np.eye(4)
     pose[:3, 3] = target[:3]

@@ -46,7 +46,8 @@ def _unfit(stage: Stage, level: str) -> str:
         "peers are asked for a single task (a posture below it may be there)": any(
             spec["kind"] != "posture" for spec in stage.scenario.tasks[1:]
         ),
-        "peers are asked for a whole pose or a position": stage.scenario.tasks[0].get("axes") not in ("pose", "position"),
+        "peers are asked for a whole pose or a position": stage.scenario.tasks[0].get("axes")
+        not in ("pose", "position"),
         "peers are asked for joints with one number each": stage.robot.nq != stage.robot.nv,
     }
     return next((reason for reason, holds in wrong.items() if holds), "")
@@ -113,9 +114,11 @@ def _as_run(peer: Peer, stage: Stage, answer: dict[str, Any], request: dict[str,
     q, spent = np.array(answer["q"], dtype=np.float64), np.array(answer["times"], dtype=np.float64)
     steps = len(request["targets"])
     if q.shape != (steps + 1, robot.nq) or spent.shape != (steps,) or not np.isfinite(q).all():
-        raise PeerUnavailable(f"{peer.name} answered with q of shape {q.shape}; expected ({steps + 1}, {robot.nq}) finite")
+        raise PeerUnavailable(
+            f"{peer.name} answered with q of shape {q.shape}; expected ({steps + 1}, {robot.nq}) finite"
+        )
     v = np.vstack([np.zeros(robot.nv), np.diff(q, axis=0) / dt])
-    time = dt * np.arange(steps + 1)
+    time: FloatArray = dt * np.arange(steps + 1, dtype=np.float64)
     state = State(robot)
     state.set(q[0], v[0])
     anchors = [task.anchor(state) for task in stage.tasks]
