@@ -70,13 +70,14 @@ def measure(run: Run, stage: Stage) -> dict[str, Any]:
 def chatter(v: FloatArray, dt: float) -> dict[str, Any]:
     """Jerk, reversals, and the share of power above 3 Hz, of rates v (N+1, n) at every dt s.
 
-    jerk: second differences of the rates over dt^2. A reversal is a sign change between samples, both faster than
-    STILL of the joint's largest rate. Power: of the one-sided spectrum without its mean, Hann window.
+    jerk: second differences of the rates over dt^2. A reversal is a sign change from one sample to the next, those
+    slower than STILL of the joint's largest rate left out. Power: of the one-sided
+    spectrum without its mean, Hann window.
     """
     top = np.abs(v).max(axis=0, initial=0.0)
     still = STILL * np.maximum(top, 1e-12)
-    signs = np.where(np.abs(v) > still, np.sign(v), 0.0)
-    flips = int((signs[1:] * signs[:-1] < 0.0).sum())
+    moving = [joint[np.abs(joint) > least] for joint, least in zip(v.T, still, strict=True)]
+    flips = sum(int((joint[1:] * joint[:-1] < 0.0).sum()) for joint in moving)
     jerk = np.diff(v, n=2, axis=0) / dt**2
     return {
         "jerk_rms": float(np.sqrt(np.mean(jerk**2))) if jerk.size else 0.0,

@@ -124,7 +124,7 @@ def obstacle_spec(value: Any) -> Table:
     given = Fields(value)
     shape = given.take("shape", f.one_of(*_SHAPES))
     made: Table = {"shape": shape, "name": given.take("name", f.text)}
-    made["ignore"] = list(given.take("ignore", f.words, ()))
+    made["ignore"] = list(given.take("ignore", _patterns, ()))
     if shape == "plane":
         made["normal"] = given.take("normal", f.point)
         made["offset"] = given.take("offset", checks.number, 0.0)
@@ -172,6 +172,11 @@ def plant_spec(value: Any) -> Table:
 
 
 _PLANT = {"masses": f.positive, "noise": f.not_negative, "payload": f.not_negative}
+
+
+def _patterns(name: str, value: Any) -> tuple[str, ...]:
+    """Names of links, none to begin with."""
+    return f.words(name, value) if value else ()
 
 
 def _posture(name: str, value: Any) -> Table:
