@@ -99,7 +99,7 @@ def on_client(client: Any) -> Engine:
 
         try:
             most = AHEAD * max(1, sum(client.nthreads().values()))
-            running = as_completed([submit(job) for job in islice(stream, most)])
+            running = as_completed([submit(job) for job in islice(stream, most)], loop=client.loop)
             for future in running:
                 try:
                     result = future.result()
