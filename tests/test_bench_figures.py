@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+
 import numpy as np
 import pytest
 
@@ -83,6 +85,16 @@ def test_figures_agree_with_the_runs_own_metrics() -> None:
     least = min(np.linalg.det(J @ J.T) ** 0.5 for J in (stage.robot.state(q).jacobian(stage.robot.tool) for q in run.q))
     assert found["manipulability"] == pytest.approx(least, rel=1e-9)
     assert found["margin"] == pytest.approx(min(j.position_margin for j in metrics.joints if j.position_margin))
+
+
+def test_a_task_that_was_skipped_has_no_nan_in_its_row() -> None:
+    scenario = short(duration=0.2)
+    stage = Stage(scenario)
+    run = cc.simulate(stage.controller(cc.SNS(), "velocity"), stage.start, 0.2)
+    run.tasks[0].scale[5] = np.nan
+    found = figures.measure(run, stage)
+    assert json.dumps(found, allow_nan=False) and found["scale_min"] == 0.0
+    assert found["scale_mean"] == pytest.approx(1.0 - 1.0 / len(run))
 
 
 def test_needed_torques_are_those_of_the_equations_of_motion() -> None:

@@ -81,7 +81,10 @@ def test_a_second_call_does_only_what_is_new(tmp_path: Path) -> None:
     assert (first.made, again.made, again.found) == (3, 0, 3)
     assert (more.made, more.found) == (5, 3) and len(set(keys_of(tmp_path))) == len(keys_of(tmp_path)) == 8
     changed = bench.run([short("a", dt=0.02)], SOLVERS, out=tmp_path)
-    assert changed.made == 3
+    assert changed.made == 3 and len(keys_of(tmp_path)) == 11
+    dts = {(r["scenario"], r["solver"]): r["dt"] for r in results(tmp_path)}
+    assert len(results(tmp_path)) == len(dts) == 7  # what was run of the old scenario is kept, and no longer shown
+    assert {dt for (name, _), dt in dts.items() if name == "a"} == {0.02}
 
 
 def test_seeds_are_kept_and_repeatable(tmp_path: Path) -> None:

@@ -140,7 +140,7 @@ def worst_cases(rows: Sequence[Row], count: int = WORST) -> list[tuple[Row, str]
             why.append(f"{row['violations']} samples outside a limit")
         if row["clearance"] is not None and row["clearance"] < 0.0:
             why.append(f"{number(-1e3 * row['clearance'])} mm inside an obstacle")
-        if len(why) > 1 or row["rms_m"] > 5e-3:
+        if len(why) > 1:
             badness = ratio * (1.0 + (row["violations"] or 0) + 1e3 * max(0.0, -(row["clearance"] or 0.0)))
             ranked.append((badness, row, ", ".join(why)))
     ranked.sort(key=lambda each: -each[0])
@@ -165,7 +165,7 @@ def _overview(rows: Sequence[Row]) -> Section:
         note="Done: not refused, not failed. Valid: done, inside all limits and clear of all obstacles. Solved: valid, "
         "and within the scenario's tolerance. Right of them shifted geometric means in multiples of the best (1.0).",
     )
-    return Section("Overview", [headline(rows) + "."], [table])
+    return Section("Overview", [], [table])
 
 
 def _counted(tally: Tally) -> list[Cell]:

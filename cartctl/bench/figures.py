@@ -179,5 +179,9 @@ def _from(run: Run, seconds: float) -> Run:
 
 
 def _finite(value: Any) -> Any:
-    """None for what is no number."""
+    """None for what is no number, however deep."""
+    if isinstance(value, list):
+        return [_finite(each) for each in value]
+    if isinstance(value, dict):
+        return {name: _finite(each) for name, each in value.items()}
     return None if isinstance(value, float) and not math.isfinite(value) else value

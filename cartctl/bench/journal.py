@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import IO, Any
 
@@ -101,6 +101,23 @@ def read(folder: Path) -> Iterator[dict[str, Any]]:
             if key not in seen:
                 seen.add(key)
                 yield row
+
+
+def current(folder: Path) -> Iterator[dict[str, Any]]:
+    """The rows of a folder's journal but for those of scenarios, or methods, that were changed and run again since."""
+    digests: dict[str, str] = {}
+    latest: dict[tuple[Any, ...], str] = {}
+    for row in read(folder):
+        digests[row["scenario"]] = row["digest"]
+        latest[case(row)] = row["key"]
+    for row in read(folder):
+        if digests[row["scenario"]] == row["digest"] and latest[case(row)] == row["key"]:
+            yield row
+
+
+def case(row: Mapping[str, Any]) -> tuple[Any, ...]:
+    """What a run is a run of, by name: scenario, method, level, repetition, seed."""
+    return tuple(row[name] for name in ("scenario", "solver", "level", "repeat", "seed"))
 
 
 def _lock(file: IO[bytes], folder: Path) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
+from cartctl.bench.journal import case
 from cartctl.bench.schema import BY_NAME, FIGURES, TIMES
 from cartctl.errors import ParameterError
 
@@ -50,20 +51,16 @@ def compare(
     for name in figures:
         if name not in FIGURES:
             raise ParameterError(f"figure {name!r} is not one of {', '.join(FIGURES)}")
-    old, new = ({_case(row): row for row in rows} for rows in (before, after))
+    old, new = ({case(row): row for row in rows} for rows in (before, after))
     worse: list[Regression] = []
     better: list[Regression] = []
-    for case, row in old.items():
-        if case in new:
-            _weigh(row, new[case], tolerance, figures, worse, better)
+    for which, row in old.items():
+        if which in new:
+            _weigh(row, new[which], tolerance, figures, worse, better)
         elif not allow_missing:
             worse.append(_entry(row, "gone", row["outcome"], "missing"))
     both = len(old.keys() & new.keys())
     return Verdict(worse, better, both, len(old) - both, len(new) - both)
-
-
-def _case(row: dict[str, Any]) -> tuple[Any, ...]:
-    return tuple(row[name] for name in ("scenario", "solver", "level", "repeat", "seed"))
 
 
 def _entry(row: dict[str, Any], figure: str, before: Any, after: Any) -> Regression:

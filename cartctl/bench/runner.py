@@ -11,7 +11,7 @@ from cartctl.bench import table
 from cartctl.bench.building import Stage
 from cartctl.bench.engines import Engine, cluster, here, processes
 from cartctl.bench.jobs import Grid
-from cartctl.bench.journal import Journal, read
+from cartctl.bench.journal import Journal, current
 from cartctl.bench.methods import methods
 from cartctl.bench.scenario import Scenario
 from cartctl.bench.sets import ScenarioSet, select
@@ -89,7 +89,7 @@ def run(
         wanted = {job.key for job in jobs.jobs()}
         found = len(wanted & journal.done)
         made, stopped = _work(jobs, journal, engine, found, tell or (lambda *_: None))
-        path = table.write(read(folder), folder / table.FILE)
+        path = table.write(current(folder), folder / table.FILE)
     return Outcome(path, made, found, len(wanted), stopped)
 
 
@@ -97,7 +97,7 @@ def _work(jobs: Grid, journal: Journal, engine: Engine, found: int, tell: Tell) 
     """Do what is left; runs made, and whether Ctrl-C ended it."""
     made, total, before = 0, len(jobs), frozenset(journal.done)
     results = engine(job for job in jobs.jobs() if job.key not in before)
-    tell(found, total, "starting")
+    tell(found, total, "starting (first use compiles)")
     try:
         for row, steps in results:
             made += journal.add(row, steps)

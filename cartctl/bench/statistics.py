@@ -2,7 +2,8 @@
 
 A cell is one scenario at one level, one repetition, one seed; there every method has one value t > 0 of a figure, less
 is better (of a figure that should be high, t is one over it). Values below the figure's floor count as the floor. A
-run that is not valid (refused, failed, outside limits, inside an obstacle) has none: t = infinity.
+run that is not valid (refused, failed, outside limits, inside an obstacle) has none: t = infinity; a time it has if it
+was done at all.
 
 Profile of a method (Dolan & More 2002): rho(tau), the share of cells in which t <= tau times the best t of the cell.
 Shifted geometric mean: exp(mean(log(t + s))) - s, s the median of all finite t, with PENALTY times the worst finite t
@@ -19,7 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from cartctl.bench.schema import BY_NAME
+from cartctl.bench.schema import BY_NAME, TIMES
 from cartctl.checks import FloatArray
 
 PENALTY = 10.0
@@ -72,7 +73,8 @@ def scores(rows: Iterable[Row], figure: str) -> Scores:
         solvers.setdefault(str(row["solver"]))
         values = cells.setdefault(cell_of(row), {})
         value = row[figure]
-        if row["valid"] and value is not None:
+        counts = row["outcome"] == "done" if figure in TIMES else row["valid"]
+        if counts and value is not None:
             low = max(float(value), column.floor)
             values[str(row["solver"])] = 1.0 / low if column.better == "high" else low
     kept = {cell: values for cell, values in cells.items() if values}

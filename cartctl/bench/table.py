@@ -7,7 +7,7 @@ from itertools import islice
 from pathlib import Path
 from typing import Any
 
-from cartctl.bench.journal import NAME, read
+from cartctl.bench.journal import NAME, current
 from cartctl.bench.schema import VERSION, arrow
 from cartctl.errors import ResultFileError
 from cartctl.files import whole_file
@@ -55,7 +55,7 @@ def results(place: Path) -> list[Row]:
     if place.is_dir():
         if not (place / NAME).is_file() and not (place / FILE).is_file():
             raise ResultFileError(f"{place} holds no bench; expected {NAME} or {FILE}, as `cartctl bench run` writes")
-        rows = list(read(place)) if (place / NAME).is_file() else list(rows_of(place / FILE))
+        rows = list(current(place)) if (place / NAME).is_file() else list(rows_of(place / FILE))
     else:
         rows = list(rows_of(place))
     if not rows:

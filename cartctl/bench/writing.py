@@ -19,7 +19,7 @@ TITLE = "cartctl bench"
 
 def markdown(rows: Sequence[Row], sections: Sequence[Section], picture: str) -> str:
     """The report as Markdown; picture: where the profiles lie."""
-    parts = [f"# {TITLE}\n"]
+    parts = [f"# {TITLE}\n", f"{headline(rows)}.\n"]
     for section in sections:
         parts.append(f"## {escaped(section.title)}\n")
         parts += [f"{escaped(text)}\n" for text in section.text]
