@@ -187,3 +187,7 @@ def test_a_peer_that_is_not_there_is_said(mine: str, monkeypatch: pytest.MonkeyP
     monkeypatch.setenv("CARTCTL_PEER_PLACO", "/no/python")
     result = cartctl("run", "--scenarios", mine, "--solvers", "placo")
     assert result.exit_code == 0 and "CARTCTL_PEER_PLACO is '/no/python'" in re.sub(r"\s+", " ", result.stdout)
+    both = cartctl("run", "--scenarios", mine, "--solvers", "pinv,placo,extended-jacobian")
+    assert re.search(r"^placo +skipped c0, c1, c2: CARTCTL_PEER_PLACO", both.stdout, re.MULTILINE)
+    assert re.search(r"^extended-jacobian +refused c0, c1, c2: ", both.stdout, re.MULTILINE)
+    assert_readable(both.stdout)

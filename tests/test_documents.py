@@ -48,6 +48,27 @@ def test_the_readmes_times_are_the_files() -> None:
     assert rows[0]["pin"] in table[1] and rows[0]["date"] in table[1]
 
 
+def test_the_readmes_comparison_is_the_files() -> None:
+    text = (ROOT / "README.md").read_text()
+    table = re.search(r"<!-- table: every_method -->\n(.*?)<!-- /table -->", text, re.DOTALL)
+    assert table is not None
+    with (ROOT / "benchmarks/results/every_method.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    heads = [h.strip() for h in table[1].splitlines()[0].strip("| ").split("|")]
+    expected = ["| " + " | ".join(r[h] for h in heads) + " |" for r in rows]
+    assert [line for line in table[1].splitlines() if line.startswith("| ")][1:] == expected and len(expected) == 10
+    assert rows[0]["pin"] in table[1] and rows[0]["date"] in table[1]
+
+
+def test_the_bench_keeps_its_memory() -> None:
+    """As measured: within 1 GiB for 10,000 runs, no more at the end than at a tenth but for noise."""
+    with (ROOT / "benchmarks/results/bench_memory.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    assert [row["runs"] for row in rows] == ["10000", "10000"] and [row["workers"] for row in rows] == ["1", "2"]
+    for row in rows:
+        assert int(row["all_MiB"]) < 1024 and int(row["own_MiB"]) - int(row["own_MiB_at_a_tenth"]) < 64
+
+
 def test_every_target_of_the_makefile_in_the_readme_exists() -> None:
     makefile = (ROOT / "Makefile").read_text()
     for target in set(re.findall(r"`?make (\w+)", (ROOT / "README.md").read_text() + (ROOT / ".ci/run").read_text())):

@@ -82,6 +82,8 @@ _COLUMNS = (
     Shown("delay", "delay s"),
     Shown("violations", "outside", 1.0, ""),
     Shown("margin", "margin", 1.0, "high"),
+    Shown("velocity_share", "rate %", 1e2, ""),
+    Shown("acceleration_share", "acc. %", 1e2, ""),
     Shown("clearance", "clear mm", 1e3, "high"),
     Shown("effort", "effort"),
     Shown("peak_torque", "peak N m"),
@@ -243,7 +245,10 @@ def _figure(value: float | None, column: Shown, values: Any, done: Any, valid: b
     text = number(None if value is None else column.factor * value)
     if value is None:
         return Cell(text)
-    if (column.figure == "violations" and value > 0) or (column.figure in ("margin", "clearance") and value < -1e-4):
+    beyond = column.figure in ("violations", "velocity_share", "acceleration_share")
+    if (beyond and value > (0.0 if column.figure == "violations" else 1.0 + 1e-9)) or (
+        column.figure in ("margin", "clearance") and value < -1e-4
+    ):
         return Cell(text, "wrong")
     rivals = [
         _text(column, v[column.figure])
@@ -275,6 +280,15 @@ def _not_done(rows: Sequence[Row]) -> Section:
         for (solver, outcome, reason), names in groups.items()
     ]
     return Section("Not done", [], [Table(["method", "outcome", "scenarios", "reason"], made)])
+
+
+def left_out(rows: Sequence[Row]) -> list[tuple[str, str]]:
+    """Methods with what they did not do, and why, in words."""
+    return [
+        (str(row[0].text), f"{row[1].text} {row[2].text}: {row[3].text}")
+        for t in _not_done(rows).tables
+        for row in t.rows
+    ]
 
 
 def _some(names: Sequence[str]) -> str:

@@ -57,7 +57,10 @@ def run(
         )  # fmt: skip
     if done.made + done.found:
         keys = {job.key for job in jobs.jobs()}
-        console.print("", bench_tables.overview([r for r in table.results(out_dir) if r["key"] in keys], console), "")
+        mine = [row for row in table.results(out_dir) if row["key"] in keys]
+        console.print("", bench_tables.overview(mine, console), "")
+        if words := bench_tables.left_out(mine):
+            console.print(words, "")
     console.print(facts(bench_tables.after(done, out_dir)))
     if done.interrupted:
         left = done.total - done.made - done.found

@@ -10,6 +10,7 @@ from rich.console import Console, RenderableType
 from rich.table import Table
 from rich.text import Text
 
+from cartctl.bench import contents
 from cartctl.bench.contents import HEADS, SUMMED
 from cartctl.bench.jobs import Grid
 from cartctl.bench.peers import peers
@@ -21,6 +22,7 @@ from cartctl.cli.console import columns, facts, number
 from cartctl.solvers import solvers
 
 _MOST = 30  # regressions that are listed
+_REASONS = 6  # why a method did not do something
 _SHORT = {"rms_m": "error\nposition", "rms_rad": "error\norientation", "effort": "effort", "jerk_rms": "jerk",
           "step_p50": "time\na step"}  # fmt: skip
 assert set(_SHORT) == set(SUMMED) == set(HEADS)
@@ -67,8 +69,6 @@ def plan(jobs: Grid, workers: int, dask: str | None, folder: Path) -> Table:
 def overview(rows: Sequence[dict[str, Any]], console: Console) -> Table:
     """By method: how many runs were done, valid, solved; means in multiples of the best where there is room."""
     there = present(rows)
-    if not there:
-        return facts([("nothing done", "; ".join(dict.fromkeys(str(r["reason"]) for r in rows if r["reason"])))])
     figures = [f for f in SUMMED if any(r["valid"] and r[f] is not None for r in there)]
     if console.width < _NARROW:
         figures = figures[:1]
@@ -87,6 +87,13 @@ def overview(rows: Sequence[dict[str, Any]], console: Console) -> Table:
         table.caption = "error, effort, jerk, time: shifted geometric means, best = 1"
         table.caption_justify = "left"
     return table
+
+
+def left_out(rows: Sequence[dict[str, Any]]) -> Table | None:
+    """What was refused, skipped or failed, and why; None where nothing was."""
+    found = contents.left_out(rows)
+    more = [("...", f"and {len(found) - _REASONS} more; the report has them all")] if len(found) > _REASONS else []
+    return facts([*found[:_REASONS], *more]) if found else None
 
 
 def _mean(means: dict[str, float], name: str) -> Text:

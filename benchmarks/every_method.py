@@ -1,0 +1,74 @@
+"""Every shipped scenario by ten methods, in the README's table: `make bench` on two cores, within ten minutes.
+
+Writes results/every_method.csv, the README's table between its two marks, and a report in out/every-method.
+"""
+
+from __future__ import annotations
+
+import re
+import shutil
+import sys
+from pathlib import Path
+from time import perf_counter
+
+from harness import save_rows, setting, show
+
+import cartctl as cc
+from cartctl.bench.statistics import scores, tallies
+
+ROOT = Path(__file__).parent.parent
+METHODS = (
+    "pinv", "dls", "projected-gradient", "task-priority", "singularity-robust-priority", "task-scaling", "sns-greedy",
+    "sns", "hqp", "qp",
+)  # fmt: skip
+FIGURES = {"rms_m": "position error", "effort": "effort", "jerk_rms": "jerk", "step_p50": "step time"}
+
+
+def run(out: Path) -> list[dict[str, str]]:
+    """The bench from nothing, its report, and the table's rows, best first."""
+    shutil.rmtree(out, ignore_errors=True)
+    begun = perf_counter()
+
+    def tell(k: int, n: int, doing: str | None) -> None:
+        if sys.stderr.isatty():
+            print(f"\r{k} of {n} {doing or '':50.50}", end="", file=sys.stderr)
+
+    done = cc.bench.run(["all"], METHODS, out=out, workers=2, tell=tell)
+    results = cc.bench.results(done.path)
+    cc.bench.report(results, out)
+    means = {figure: scores(results, figure).means() for figure in FIGURES}
+    counts = tallies(results)
+    order = sorted(counts, key=lambda name: (-counts[name].solved, means["rms_m"][name]))
+    print(f"\n{done.made} runs in {perf_counter() - begun:.0f} s; the report: {out / 'report.html'}")
+    return [
+        {
+            "method": name,
+            "runs": str(counts[name].runs),
+            "valid": str(counts[name].valid),
+            "solved": str(counts[name].solved),
+            **{head: f"{means[figure][name]:.2f}" for figure, head in FIGURES.items()},
+        }
+        for name in order
+    ]
+
+
+def write_table(rows: list[dict[str, str]], extra: dict[str, str]) -> None:
+    """The README's table."""
+    readme = ROOT / "README.md"
+    lines = [f"| {' | '.join(rows[0])} |", "|" + "---|" * len(rows[0])]
+    lines += [f"| {' | '.join(row.values())} |" for row in rows]
+    facts = ", ".join(f"{key} {value}" for key, value in extra.items())
+    made = "<!-- table: every_method -->\n" + "\n".join(lines) + f"\n\n{facts}.\n<!-- /table -->"
+    text = readme.read_text()
+    new, found = re.subn(
+        r"<!-- table: every_method -->\n.*?<!-- /table -->", lambda _: made, text, count=1, flags=re.DOTALL
+    )
+    assert found, "the README has lost its mark"
+    readme.write_text(new)
+
+
+if __name__ == "__main__":
+    table = run(ROOT / "out" / "every-method")
+    show("Every scenario by ten methods", table)
+    save_rows(ROOT / "benchmarks" / "results" / "every_method.csv", table, setting())
+    write_table(table, setting())
