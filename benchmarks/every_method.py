@@ -1,6 +1,7 @@
 """Every shipped scenario by ten methods, in the README's table: `make bench` on two cores, within ten minutes.
 
-Writes results/every_method.csv, the README's table between its two marks, and a report in out/every-method.
+Writes results/every_method.csv, the README's table between its two marks, and a report in out/every-method. With
+--resume it goes on where it was stopped, otherwise it begins from nothing.
 """
 
 from __future__ import annotations
@@ -25,8 +26,7 @@ FIGURES = {"rms_m": "position error", "effort": "effort", "jerk_rms": "jerk", "s
 
 
 def run(out: Path) -> list[dict[str, str]]:
-    """The bench from nothing, its report, and the table's rows, best first."""
-    shutil.rmtree(out, ignore_errors=True)
+    """The bench, its report, and the table's rows, best first."""
     begun = perf_counter()
 
     def tell(k: int, n: int, doing: str | None) -> None:
@@ -68,7 +68,10 @@ def write_table(rows: list[dict[str, str]], extra: dict[str, str]) -> None:
 
 
 if __name__ == "__main__":
-    table = run(ROOT / "out" / "every-method")
+    folder = ROOT / "out" / "every-method"
+    if "--resume" not in sys.argv:
+        shutil.rmtree(folder, ignore_errors=True)
+    table = run(folder)
     show("Every scenario by ten methods", table)
     save_rows(ROOT / "benchmarks" / "results" / "every_method.csv", table, setting())
     write_table(table, setting())

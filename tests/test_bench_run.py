@@ -179,6 +179,19 @@ def test_ctrl_c_keeps_what_is_done(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     assert bench.run(short(), SOLVERS, out=tmp_path).made == 1
 
 
+@pytest.mark.parametrize("workers", [1, 2])
+def test_a_real_ctrl_c_ends_it_in_order(tmp_path: Path, workers: int) -> None:
+    """As a terminal sends it: to the process and its workers alike."""
+    file, out = toml(tmp_path / "many.toml", 12, 0.3), tmp_path / "out"
+    process = bench_process(out, file, "--workers", str(workers))
+    wait_for_lines(out, 4, process)
+    os.killpg(process.pid, signal.SIGINT)
+    assert process.wait(timeout=120) == 130
+    kept = keys_of(out)
+    assert 4 <= len(kept) < 36 and [r["key"] for r in results(out / "results.parquet")] == kept
+    assert bench.run(str(file), SOLVERS, out=out).found == len(kept)
+
+
 def test_steps_are_kept_on_request(tmp_path: Path) -> None:
     bench.run(short(), "pinv", out=tmp_path, keep_steps=True)
     (row,) = results(tmp_path)
