@@ -19,6 +19,7 @@ from harness import save_rows, setting, show
 
 import cartctl as cc
 
+LIMIT = 1024.0  # MiB
 RUNS, SOLVERS = 10_000, ("pinv", "dls", "task-scaling", "projected-gradient")
 SCENARIO = cc.Scenario(
     "two-steps", "planar3R", [{"axes": "xy", "target": {"kind": "circle", "radius": 0.2}}], duration=0.02, dt=0.01,
@@ -96,7 +97,10 @@ def measured(workers: int, runs: int) -> dict[str, str]:
 
 if __name__ == "__main__":
     count = int(sys.argv[1]) if len(sys.argv) > 1 else RUNS
-    rows = [measured(workers, count) for workers in (1, 2)]
-    show(f"{count} short runs", rows)
-    if count == RUNS:
-        save_rows(Path(__file__).parent / "results" / "bench_memory.csv", rows, setting())
+    rows: list[dict[str, str]] = []
+    for workers in (1, 2):
+        rows.append(measured(workers, count))
+        assert float(rows[-1]["all_MiB"]) < LIMIT, rows[-1]
+        show(f"{count} short runs", rows)
+        if count == RUNS:
+            save_rows(Path(__file__).parent / "results" / "bench_memory.csv", rows, setting())

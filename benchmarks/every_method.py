@@ -1,7 +1,8 @@
-"""Every shipped scenario by ten methods, in the README's table: `make bench` on two cores, within ten minutes.
+"""The lectures' arms and five robots by ten methods, in the README's table: `make bench`, minutes on two cores.
 
 Writes results/every_method.csv, the README's table between its two marks, and a report in out/every-method. With
---resume it goes on where it was stopped, otherwise it begins from nothing.
+--resume it goes on where it was stopped, otherwise it begins from nothing. Other sets by name (`every_method.py all`)
+are shown, and leave the files alone.
 """
 
 from __future__ import annotations
@@ -9,15 +10,18 @@ from __future__ import annotations
 import re
 import shutil
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from time import perf_counter
 
 from harness import save_rows, setting, show
 
 import cartctl as cc
+from cartctl.bench.runner import grid
 from cartctl.bench.statistics import scores, tallies
 
 ROOT = Path(__file__).parent.parent
+SETS = ("lectures", "arms")
 METHODS = (
     "pinv", "dls", "projected-gradient", "task-priority", "singularity-robust-priority", "task-scaling", "sns-greedy",
     "sns", "hqp", "qp",
@@ -25,7 +29,7 @@ METHODS = (
 FIGURES = {"rms_m": "position error", "effort": "effort", "jerk_rms": "jerk", "step_p50": "step time"}
 
 
-def run(out: Path) -> list[dict[str, str]]:
+def run(sets: Sequence[str], out: Path) -> list[dict[str, str]]:
     """The bench, its report, and the table's rows, best first."""
     begun = perf_counter()
 
@@ -33,8 +37,9 @@ def run(out: Path) -> list[dict[str, str]]:
         if sys.stderr.isatty():
             print(f"\r{k} of {n} {doing or '':50.50}", end="", file=sys.stderr)
 
-    done = cc.bench.run(["all"], METHODS, out=out, workers=2, tell=tell)
-    results = cc.bench.results(done.path)
+    done = cc.bench.run(sets, METHODS, out=out, workers=2, tell=tell)
+    wanted = {job.key for job in grid(sets, METHODS).jobs()}
+    results = [row for row in cc.bench.results(done.path) if row["key"] in wanted]
     cc.bench.report(results, out)
     means = {figure: scores(results, figure).means() for figure in FIGURES}
     counts = tallies(results)
@@ -71,7 +76,9 @@ if __name__ == "__main__":
     folder = ROOT / "out" / "every-method"
     if "--resume" not in sys.argv:
         shutil.rmtree(folder, ignore_errors=True)
-    table = run(folder)
-    show("Every scenario by ten methods", table)
-    save_rows(ROOT / "benchmarks" / "results" / "every_method.csv", table, setting())
-    write_table(table, setting())
+    chosen = [name for name in sys.argv[1:] if not name.startswith("-")]
+    table = run(chosen or SETS, folder)
+    show(f"{', '.join(chosen or SETS)} by ten methods", table)
+    if not chosen:
+        save_rows(ROOT / "benchmarks" / "results" / "every_method.csv", table, setting())
+        write_table(table, setting())

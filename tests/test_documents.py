@@ -60,15 +60,6 @@ def test_the_readmes_comparison_is_the_files() -> None:
     assert rows[0]["pin"] in table[1] and rows[0]["date"] in table[1]
 
 
-def test_the_bench_keeps_its_memory() -> None:
-    """As measured: within 1 GiB for 10,000 runs, no more at the end than at a tenth but for noise."""
-    with (ROOT / "benchmarks/results/bench_memory.csv").open() as file:
-        rows = list(csv.DictReader(file))
-    assert [row["runs"] for row in rows] == ["10000", "10000"] and [row["workers"] for row in rows] == ["1", "2"]
-    for row in rows:
-        assert int(row["all_MiB"]) < 1024 and int(row["own_MiB"]) - int(row["own_MiB_at_a_tenth"]) < 64
-
-
 def test_every_target_of_the_makefile_in_the_readme_exists() -> None:
     makefile = (ROOT / "Makefile").read_text()
     for target in set(re.findall(r"`?make (\w+)", (ROOT / "README.md").read_text() + (ROOT / ".ci/run").read_text())):
