@@ -60,6 +60,8 @@ def _panel(axes: Any, rows: Sequence[Row], figure: str, names: Sequence[str]) ->
     for k, name in enumerate(names):
         if name in found.solvers:
             axes.step(taus, found.profile(taus)[found.solvers.index(name)], where="post", **pen(k, name).options())
+    from matplotlib.ticker import LogLocator
+
     column = BY_NAME[figure]
     axes.set_title(TITLES.get(figure, column.says.partition(",")[0]), loc="left", fontsize=10, fontweight="bold")
     axes.set_title(f"{len(found.cells)} cells", loc="right", fontsize=8, color="0.35")
@@ -68,6 +70,8 @@ def _panel(axes: Any, rows: Sequence[Row], figure: str, names: Sequence[str]) ->
     axes.set_ylim(0.0, 1.02)
     axes.set_xlabel("within this factor of the best", fontsize=9)
     axes.set_ylabel("share of cells", fontsize=9)
+    if top < 100.0:  # within two decades powers of ten alone would say little
+        axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 1.5, 2.0, 3.0, 5.0) if top < 10.0 else (1.0, 2.0, 5.0)))
     axes.xaxis.set_major_formatter(lambda value, _: f"{value:g}")
     axes.xaxis.set_minor_formatter(lambda *_: "")
     axes.tick_params(labelsize=8)
