@@ -96,6 +96,7 @@ _HOMES = {
     "cartctl.motion.simulate": ("simulate",),
     "cartctl.motion.run": ("Run", "TaskRecord"),
     "cartctl.motion.metrics": ("JointMetrics", "Metrics", "TaskMetrics"),
+    "cartctl.bench.scenario": ("Scenario",),
     "cartctl.paths": (
         "Circle",
         "Ellipse",
@@ -110,13 +111,7 @@ _HOMES = {
         "Waypoints",
     ),
 }
-_MODULES = (
-    "analysis",
-    "calibration",
-    "dynamics",
-    "spatial",
-    "statics",
-)  # reached as cc.NAME; their names stay inside them
+_MODULES = ("analysis", "bench", "calibration", "dynamics", "spatial", "statics")  # as cc.NAME; their names stay inside
 _HOME_OF = {name: module for module, names in _HOMES.items() for name in names}
 
 __all__ = ["__version__", *sorted(_HOME_OF)]  # noqa: PLE0604 - names, from the table above
@@ -136,6 +131,7 @@ if TYPE_CHECKING:  # editors and mypy see what __getattr__ finds
     from cartctl.algebra.problem import Problem as Problem
     from cartctl.algebra.solution import Solution as Solution
     from cartctl.algebra.solution import Status as Status
+    from cartctl.bench.scenario import Scenario as Scenario
     from cartctl.calibration.calibrate import calibrate as calibrate
     from cartctl.calibration.dh_chain import DHChain as DHChain
     from cartctl.calibration.result import Calibration as Calibration

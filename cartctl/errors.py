@@ -106,6 +106,26 @@ class MeasurementError(CartctlError, ValueError):
     """A table of measurements has a wrong header, or a cell that is no number."""
 
 
+class ScenarioError(CartctlError, ValueError):
+    """A scenario of the bench is ill-defined; ``keys`` leads to the entry, ``place`` says file and line if it has one.
+
+    reason: what is wrong, without the place.
+    """
+
+    def __init__(self, reason: str, keys: tuple[str | int, ...] = (), place: str = "") -> None:
+        self.reason, self.keys, self.place = reason, keys, place
+        path = "".join(f"[{key}]" if isinstance(key, int) else f".{key}" for key in keys).lstrip(".")
+        super().__init__(": ".join(part for part in (place, path, reason) if part))
+
+
+class ResultFileError(CartctlError, ValueError):
+    """A file of bench results cannot be read, or was written by another version of its schema."""
+
+
+class BenchError(CartctlError, RuntimeError):
+    """A bench cannot go on: its folder is in use, holds another bench, or its workers keep dying."""
+
+
 class MissingDependencyError(CartctlError, ImportError):
     """A package is missing; the message holds the command that installs it."""
 

@@ -48,6 +48,29 @@ def test_the_readmes_times_are_the_files() -> None:
     assert rows[0]["pin"] in table[1] and rows[0]["date"] in table[1]
 
 
+def test_the_readmes_comparison_is_the_files() -> None:
+    text = (ROOT / "README.md").read_text()
+    table = re.search(r"<!-- table: every_method -->\n(.*?)<!-- /table -->", text, re.DOTALL)
+    assert table is not None
+    with (ROOT / "benchmarks/results/every_method.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    heads = [h.strip() for h in table[1].splitlines()[0].strip("| ").split("|")]
+    expected = ["| " + " | ".join(r[h] for h in heads) + " |" for r in rows]
+    assert [line for line in table[1].splitlines() if line.startswith("| ")][1:] == expected and len(expected) == 10
+    assert rows[0]["pin"] in table[1] and rows[0]["date"] in table[1]
+
+
+def test_ten_thousand_runs_fit_a_gibibyte_as_the_guide_says() -> None:
+    with (ROOT / "benchmarks/results/bench_memory.csv").open() as file:
+        rows = {row["workers"]: row for row in csv.DictReader(file)}
+    assert set(rows) == {"1", "2"} and all(row["runs"] == "10000" for row in rows.values())
+    assert all(int(row["all_MiB"]) < 1024 for row in rows.values())
+    grown = [int(row["all_MiB"]) - int(row["all_MiB_at_a_tenth"]) for row in rows.values()]
+    assert max(grown) < 100  # for nine times as many runs: what writing the table takes
+    said = f"{rows['1']['all_MiB']} MiB alone, {rows['2']['all_MiB']} MiB with two workers"
+    assert said in " ".join((ROOT / "docs/guide.md").read_text().split())
+
+
 def test_every_target_of_the_makefile_in_the_readme_exists() -> None:
     makefile = (ROOT / "Makefile").read_text()
     for target in set(re.findall(r"`?make (\w+)", (ROOT / "README.md").read_text() + (ROOT / ".ci/run").read_text())):

@@ -43,7 +43,8 @@ MAY_IMPORT = {
     "motion": JOINED | {"files"},
     "calibration": JOINED | {"files"},
     "report": JOINED | {"files", "motion", "calibration"},
-    "cli": JOINED | {"analysis", "calibration", "files", "motion", "report"},
+    "bench": JOINED | {"files", "motion", "report"},
+    "cli": JOINED | {"analysis", "bench", "calibration", "files", "motion", "report"},
     "__main__": {"cli"},
 }
 # The one named exception: Run.plot and Run.html.

@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 
 from cartctl import __version__
+from cartctl.cli.bench import app as bench
 from cartctl.cli.calibrate import calibrate
 from cartctl.cli.compare import compare
 from cartctl.cli.doctor import doctor
@@ -53,5 +54,6 @@ app.command(
     epilog="Example:  cartctl calibrate measured.csv --robot panda --parameters 'placements tool' --align --open\n\n"
     "Header, for example:  panda_joint1 (deg),...,panda_joint7 (deg),x (mm),y (mm),z (mm)"
 )(calibrate)
+app.add_typer(bench, name="bench", epilog="Example:  cartctl bench run --scenarios arms --workers 2")
 app.command(epilog="Example:  cartctl info panda")(info)
 app.command(epilog="Example:  cartctl doctor")(doctor)

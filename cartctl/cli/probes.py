@@ -24,6 +24,7 @@ PACKAGES = {
     "daqp": ("daqp", "0.7"),
     "osqp": ("osqp", "1.0"),
     "meshcat": ("meshcat", "0.3.2"),
+    "joblib": ("joblib", "1.4"),
     "matplotlib": ("matplotlib", "3.7"),
     "u-msgpack-python": ("umsgpack", "2.8"),
     "pyarrow": ("pyarrow", "14"),

@@ -23,18 +23,18 @@ def to_csv(comparison: Comparison, path: Path) -> Path:
 def to_markdown(comparison: Comparison, path: Path) -> Path:
     """Write the same with three digits, the best of each column in bold."""
     best = [comparison.best(index) for index in range(len(comparison.columns))]
-    lines = [["solver", *(_escaped(column.title) for column in comparison.columns), "remark"]]
+    lines = [["solver", *(escaped(column.title) for column in comparison.columns), "remark"]]
     lines.append(["---", *(["---:"] * len(best)), "---"])
     for name in comparison.runs:
         cells = (f"**{text}**" if name in best[i] else text for i, text in enumerate(comparison.shown(name)))
-        lines.append([_escaped(name), *cells, _escaped(comparison.remark(name))])
-    lines += [[_escaped(name), *("" for _ in best), _escaped(comparison.remark(name))] for name in comparison.refused]
+        lines.append([escaped(name), *cells, escaped(comparison.remark(name))])
+    lines += [[escaped(name), *("" for _ in best), escaped(comparison.remark(name))] for name in comparison.refused]
     with whole_file(path) as part:
         part.write_text("".join(f"| {' | '.join(line)} |\n" for line in lines), encoding="utf-8", newline="\n")
     return path
 
 
-def _escaped(text: str) -> str:
+def escaped(text: str) -> str:
     """A cell of a Markdown table: nothing in it ends the cell or starts an element."""
     for sign in "\\|<>*_`[]":
         text = text.replace(sign, "\\" + sign)
