@@ -10,6 +10,7 @@ from cartctl import __version__
 from cartctl.cli.compare import compare
 from cartctl.cli.doctor import doctor
 from cartctl.cli.info import info
+from cartctl.cli.plan import plan
 from cartctl.cli.track import track
 
 _EXAMPLE = "Example:  cartctl track panda --open"
@@ -47,5 +48,9 @@ app.command(
     epilog="Example:  cartctl compare panda\n\n"
     "Example:  cartctl compare panda --solvers pinv,projected-gradient,extended-jacobian --laps 5 --open"
 )(compare)
+app.command(
+    epilog="Example:  cartctl plan panda --closed --free-start --open\n\n"
+    "Example:  cartctl plan lwr --objective joint-speed --path polygon --samples 300"
+)(plan)
 app.command(epilog="Example:  cartctl info panda")(info)
 app.command(epilog="Example:  cartctl doctor")(doctor)

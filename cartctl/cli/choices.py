@@ -19,6 +19,14 @@ OBJECTIVES = (
     "gravity-torque",
     "none",
 )
+PLAN_OBJECTIVES = (
+    "kinetic-energy",
+    "joint-speed",
+    "joint-range",
+    "inverse-manipulability",
+    "self-clearance",
+    "torque",
+)
 
 
 class UnknownChoice(LookupFailure):

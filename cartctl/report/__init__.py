@@ -11,13 +11,15 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from cartctl.report.comparison import Comparison as Comparison
     from cartctl.report.html import write_html as write_html
+    from cartctl.report.planning import plot_plan as plot_plan
     from cartctl.report.plots import plot_run as plot_run
 
-__all__ = ["Comparison", "plot_run", "write_html"]
+__all__ = ["Comparison", "plot_plan", "plot_run", "write_html"]
 
 _HOMES = {
     "Comparison": "cartctl.report.comparison",
     "write_html": "cartctl.report.html",
+    "plot_plan": "cartctl.report.planning",
     "plot_run": "cartctl.report.plots",
 }
 
