@@ -28,6 +28,13 @@ def tireless() -> cc.Robot:
     return robot
 
 
+def weightless() -> cc.Robot:
+    model = cc.planar([1.0, 0.7]).model.copy()
+    for i in range(1, model.njoints):
+        model.inertias[i] = pin.Inertia.Zero()
+    return cc.Robot(model)
+
+
 def near(robot: cc.Robot) -> cc.Posture:
     return cc.Posture(target=robot.integrate(robot.home, np.full(robot.nv, 0.3)))
 
@@ -184,6 +191,7 @@ def test_names_stand_for_costs() -> None:
         (lambda: cc.JointSpeed(np.zeros(7)), ParameterError),
         (lambda: -1.0 * cc.JointSpeed(), ParameterError),
         (lambda: cc.JointSpeed(np.ones(3)).check(panda()), ShapeError),
+        (lambda: as_cost("kinetic-energy").check(weightless()), ParameterError),
         (lambda: cc.SquaredTorque("all"), ParameterError),
         (lambda: cc.SquaredTorque(np.ones(3)).check(panda()), ShapeError),
         (lambda: cc.SquaredTorque("limits").check(tireless()), ParameterError),

@@ -38,7 +38,7 @@ def test_out_of_reach() -> None:
     assert k == far.index(True)
     assert "task 'tip' is missed by" in report.message and "out of reach" in report.message
     missed = float(re.search(r"missed by ([\d.e-]+) m", report.message)[1])
-    assert missed == pytest.approx(np.linalg.norm(tip.target(float(plan.time[k])).position) - 2.1, rel=0.05, abs=1e-3)
+    assert missed == pytest.approx(np.linalg.norm(tip.target(float(plan.time[k])).position) - 2.1, rel=1e-2)
     assert plan.status[k] == "INFEASIBLE" and plan.status[0] == "OPTIMAL"
     assert np.isfinite(plan.q).all() and plan.metrics().steps == 40
     assert str(report).startswith("OUT_OF_REACH")
@@ -80,8 +80,8 @@ def test_time_makes_it_feasible() -> None:
     """The advice of the message holds: three times as long, and the same limits are kept."""
     robot = panda()
     limits = robot.limits.replace(velocity_upper=0.6, velocity_lower=-0.6)
-    told(robot, circle(robot, 0.2, period=1.5), samples=40, limits=limits, q0=robot.home)
-    plan = cc.plan(robot, circle(robot, 0.2, period=6.0), samples=40, limits=limits, q0=robot.home, methods=("pinv",))
+    told(robot, circle(robot, 0.12, period=1.5), samples=40, limits=limits, q0=robot.home)
+    plan = cc.plan(robot, circle(robot, 0.12, period=6.0), samples=40, limits=limits, q0=robot.home, methods=("pinv",))
     assert plan.report.feasible
 
 

@@ -19,6 +19,7 @@ from cartctl.objectives import JointRange
 from cartctl.solvers import Solver, get_solver
 from cartctl.tasks.base import Task
 from cartctl.wholepath.costs.base import PathCost
+from cartctl.wholepath.costs.speed import has_inertia
 from cartctl.wholepath.manifold import Projected, look
 from cartctl.wholepath.rows import Rows
 from cartctl.wholepath.setting import Setting
@@ -63,10 +64,10 @@ def controllers(setting: Setting, tasks: Sequence[Task], methods: Sequence[Any] 
     limits = setting.limits
     if methods is None:
         spare = JointRange() if np.isfinite(setting.robot.limits.position_upper).any() else None
-        found = [
-            ("pinv", Controller(solver="pinv", limits=None, **common)),
-            ("pinv, inertia", Controller(solver="pinv", limits=None, metric="inertia", **common)),
-        ]
+        heavy = has_inertia(setting.robot)
+        found = [("pinv", Controller(solver="pinv", limits=None, **common))]
+        if heavy:
+            found.append(("pinv, inertia", Controller(solver="pinv", limits=None, metric="inertia", **common)))
         if spare is not None:
             how: dict[str, Any] = {
                 "solver": "projected-gradient",
@@ -78,7 +79,8 @@ def controllers(setting: Setting, tasks: Sequence[Task], methods: Sequence[Any] 
         if limits is not None:
             held: dict[str, Any] = {"solver": "sns", "limits": limits, "path_clock": False}  # the timing is given
             found.append(("sns", Controller(**held, **common)))
-            found.append(("sns, inertia", Controller(metric="inertia", **held, **common)))
+            if heavy:
+                found.append(("sns, inertia", Controller(metric="inertia", **held, **common)))
         return found
     return [_controller(method, limits, common) for method in _listed(methods)]
 

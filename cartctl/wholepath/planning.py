@@ -71,7 +71,7 @@ def plan(
 
     rest: whether the motion starts and ends at rest (which is told by the acceleration limits, and by torques).
     methods: the local methods to compare with, and to start from: names of solvers or Controllers; None takes
-    ``pinv`` with and without the inertia metric, ``projected-gradient``, and under limits ``sns`` with and without it.
+    ``pinv`` with and without the inertia metric (with masses), ``projected-gradient``, under limits ``sns`` likewise.
     starts: Runs, or joint paths (any number of samples, nq) over the same time, to start from as well. iterations: of
     each fine search, at most. seed: of the random postures. progress(words) is told what is being done.
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from cartctl.checks import FloatArray
 from cartctl.wholepath.manifold import newton
 from cartctl.wholepath.report import PlanStatus
 from cartctl.wholepath.rows import Rows
@@ -12,6 +13,7 @@ from cartctl.wholepath.sqp import Optimised
 from cartctl.wholepath.trace import Trace
 
 _TRIES = 40  # random postures tried at a sample that is missed
+_POLISHED = 3  # of these, the nearest are brought as near as they come
 _UNITS = {"position": "{u}", "velocity": "{u}/s", "acceleration": "{u}/s^2"}
 
 
@@ -39,22 +41,36 @@ def _missed(trace: Trace, rng: np.random.Generator) -> str:
     found, met = newton(setting, k, starts, rounds=60)
     if met.any():
         return (
-            f"{at(setting, k)}: {_worst_task(trace, k)}; another posture reaches it there, but none that was found "
-            "passes through all samples before: another q0, or q0=None, may help"
+            f"{at(setting, k)}: {_worst_task(setting, trace.E[k])}; another posture reaches it there, but none "
+            "that was found passes through all samples before: another q0, or q0=None, may help"
         )
-    least = min(float(np.linalg.norm(setting.errors(k, q))) for q in [*found, trace.Q[k]])
-    return (
-        f"{at(setting, k)}: {_worst_task(trace, k)}: out of reach; of {_TRIES + 1} other postures none comes nearer "
-        f"than {least:.3g} (m and rad together)"
-    )
+    near = sorted(found, key=lambda q: float(np.linalg.norm(setting.errors(k, q))))[:_POLISHED]
+    best = min((closest(setting, k, q) for q in [*near, trace.Q[k]]), key=lambda e: float(np.linalg.norm(e)))
+    return f"{at(setting, k)}: {_worst_task(setting, best)}: out of reach; of {_TRIES + 1} postures none comes nearer"
 
 
-def _worst_task(trace: Trace, k: int) -> str:
-    setting, rows = trace.setting, 0
+def closest(setting: Setting, k: int, q: FloatArray, rounds: int = 80) -> FloatArray:
+    """The task errors (m,) at sample k where their norm is least near q, by Levenberg and Marquardt's method."""
+    damping, e = 1e-2, setting.errors(k, q)
+    J = setting.jacobian()
+    for _ in range(rounds):
+        step = np.linalg.solve(J.T @ J + damping * np.eye(J.shape[1]), J.T @ e)
+        there = setting.robot.integrate(q, step)
+        after = setting.errors(k, there)
+        if np.linalg.norm(after) < np.linalg.norm(e):
+            q, e, J, damping = there, after, setting.jacobian(), max(0.2 * damping, 1e-12)
+        else:
+            damping = min(5.0 * damping, 1e6)
+    return e
+
+
+def _worst_task(setting: Setting, errors: FloatArray) -> str:
+    """Which task has the largest error, by how much."""
+    rows = 0
     worst = ("", -1.0, "")
     for task in setting.tasks:
         units = task.units(setting.robot)
-        error = trace.E[k, rows : rows + len(units)]
+        error = errors[rows : rows + len(units)]
         rows += len(units)
         for unit in dict.fromkeys(units):
             size = float(np.linalg.norm(error[[u == unit for u in units]]))

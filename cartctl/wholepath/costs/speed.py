@@ -14,6 +14,7 @@ import pinocchio as pin
 
 from cartctl import checks
 from cartctl.checks import FloatArray
+from cartctl.errors import ParameterError
 from cartctl.model.robot import Robot
 from cartctl.model.state import State
 from cartctl.wholepath.blocks import Quadratic
@@ -91,6 +92,14 @@ class PathEnergy(PathCost):
         full.g[1:] += 0.5 * setting.h * slopes[1][1:]
         return full
 
+    def check(self, robot: Robot) -> None:
+        """There must be masses to move."""
+        if not has_inertia(robot):
+            raise ParameterError(
+                f"{robot.name!r} has a singular mass matrix at home (a URDF without masses?), so that its kinetic "
+                "energy says nothing; plan with objective='joint-speed'"
+            )
+
     def pace(self, state: State) -> FloatArray:
         """M."""
         return state.mass_matrix
@@ -120,6 +129,12 @@ class PathEnergy(PathCost):
         full.X0 += sign * (E + E.transpose(0, 2, 1)) + 0.25 * setting.h * (F + F.transpose(0, 2, 1))
         full.X1 += 0.5 * E[:-1].transpose(0, 2, 1) if first else -0.5 * E[1:]
         return slope
+
+
+def has_inertia(robot: Robot) -> bool:
+    """Whether the mass matrix at home is positive definite, to twelve digits."""
+    values = np.linalg.eigvalsh(robot.state(robot.home).mass_matrix)
+    return bool(values[0] > 1e-12 * values[-1] > 0.0)
 
 
 def _slopes(trace: Trace) -> tuple[FloatArray, FloatArray]:
