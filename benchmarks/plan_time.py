@@ -17,7 +17,7 @@ import numpy as np
 import cartctl as cc
 
 RESULTS = Path(__file__).parent / "results" / "plan_time.csv"
-SAMPLES, ROUNDS = 300, 5
+SAMPLES, ROUNDS = 300, 3
 KINDS = {"start fixed": {}, "start free": {"free": True}, "closed, start fixed": {"closed": True},
          "closed, start free": {"closed": True, "free": True}}  # fmt: skip
 

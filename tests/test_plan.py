@@ -149,9 +149,9 @@ def test_the_local_view() -> None:
     robot = panda()
     hand = circle(robot, 0.15, period=3.0)
     held = cc.Controller(robot, hand, solver="dls", limits=None, dt=3.0 / 59 / 10)
-    plan = cc.plan(robot, hand, samples=60, q0=robot.home, closed=True, methods=["pinv", held])
+    plan = cc.plan(robot, hand, samples=60, q0=robot.home, closed=True, methods=["pinv", held, held, "pinv"])
     report = plan.report
-    assert [m.name for m in report.local] == ["pinv", "dls"]
+    assert [m.name for m in report.local] == ["pinv", "dls", "dls (2)", "pinv (2)"]
     for method in report.local:
         run = method.run
         every = round(plan.meta["dt"] / run.meta["dt"])

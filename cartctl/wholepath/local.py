@@ -82,7 +82,12 @@ def controllers(setting: Setting, tasks: Sequence[Task], methods: Sequence[Any] 
             if heavy:
                 found.append(("sns, inertia", Controller(metric="inertia", **held, **common)))
         return found
-    return [_controller(method, limits, common) for method in _listed(methods)]
+    named: dict[str, Controller] = {}
+    for method in _listed(methods):
+        name, controller = _controller(method, limits, common)
+        same = sum(known == name or known.startswith(f"{name} (") for known in named)
+        named[f"{name} ({same + 1})" if same else name] = controller
+    return list(named.items())
 
 
 def _listed(methods: Any) -> list[Any]:
@@ -97,7 +102,8 @@ def _controller(method: Any, limits: Limits | None, common: dict[str, Any]) -> t
     if isinstance(method, Controller):
         if method.robot is not common["robot"]:
             raise ParameterError("methods holds a Controller of another robot; expected one of the plan's own")
-        return method.solver.name, method
+        metric = f", {method.metric}" if isinstance(method.metric, str) else ""
+        return method.solver.name + metric, method
     solver = get_solver(method)
     held = limits if "bounds" in solver.honours else None
     return solver.name, Controller(solver=solver, limits=held, **common)

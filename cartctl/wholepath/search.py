@@ -110,7 +110,7 @@ def search(
         final[seed.name] = finer.cost
         if _rank(finer) < _rank(outcome.best):
             outcome.best, outcome.history = finer, ([] if finer is done else done.history) + finer.history
-    for seed in (s for s in seeds if s in given or s in own):  # never worse than a start that keeps everything
+    for seed in [*given, *own]:  # never worse than a start that keeps everything
         trace = _through(setting, seed)
         if not trace.met.all() or excess_of(rows, trace) > 0.0:
             continue
