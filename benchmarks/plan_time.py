@@ -38,18 +38,21 @@ def svds(rng):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--robots", default="panda")
+    parser.add_argument("--rounds", type=int, default=ROUNDS)
+    parser.add_argument("--radius", type=float, default=0.15)
     parser.add_argument("--save", action="store_true")
     options = parser.parse_args()
     from harness import save_rows, setting, show
 
     rows, rng = [], np.random.default_rng(0)
-    for name in ("panda", "lwr"):
+    for name in options.robots.split(","):
         robot = cc.load(name)
         start = robot.state(robot.home).placement(robot.tool)
-        hand = cc.FrameTask(robot.tool, target=cc.Circle.starting_at(start, radius=0.15, period=4.0))
+        hand = cc.FrameTask(robot.tool, target=cc.Circle.starting_at(start, radius=options.radius, period=4.0))
         first = once(robot, hand)[1]
         for kind, how in KINDS.items():
-            found = [(*once(robot, hand, **how), svds(rng)) for _ in range(ROUNDS)]
+            found = [(*once(robot, hand, **how), svds(rng)) for _ in range(options.rounds)]
             wall, cpu = (float(np.median([f[i] for f in found])) for i in (1, 2))
             ratio = float(np.median([f[2] / f[3] for f in found]))
             report = found[0][0].report
