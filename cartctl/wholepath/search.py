@@ -108,7 +108,7 @@ def search(
             finer = optimise(done.trace, cost, rows, iterations)
         outcome.count(finer)
         final[seed.name] = finer.cost
-        if _rank(finer) < _rank(outcome.best):
+        if _rank(finer) <= _rank(outcome.best):
             outcome.best, outcome.history = finer, ([] if finer is done else done.history) + finer.history
     for seed in [*given, *own]:  # never worse than a start that keeps everything
         trace = _through(setting, seed)
