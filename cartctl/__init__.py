@@ -73,6 +73,7 @@ _HOMES = {
         "FunctionObjective",
         "GravityTorque",
         "InverseCondition",
+        "InverseManipulability",
         "JointRange",
         "KineticEnergy",
         "Manipulability",
@@ -97,6 +98,17 @@ _HOMES = {
     "cartctl.motion.run": ("Run", "TaskRecord"),
     "cartctl.motion.metrics": ("JointMetrics", "Metrics", "TaskMetrics"),
     "cartctl.bench.scenario": ("Scenario",),
+    "cartctl.wholepath": (
+        "JointSpeed",
+        "LocalMethod",
+        "PathCost",
+        "Plan",
+        "PlanReport",
+        "PlanStatus",
+        "SquaredTorque",
+        "Start",
+        "plan",
+    ),
     "cartctl.paths": (
         "Circle",
         "Ellipse",
@@ -176,6 +188,7 @@ if TYPE_CHECKING:  # editors and mypy see what __getattr__ finds
     from cartctl.objectives import FunctionObjective as FunctionObjective
     from cartctl.objectives import GravityTorque as GravityTorque
     from cartctl.objectives import InverseCondition as InverseCondition
+    from cartctl.objectives import InverseManipulability as InverseManipulability
     from cartctl.objectives import JointRange as JointRange
     from cartctl.objectives import KineticEnergy as KineticEnergy
     from cartctl.objectives import Manipulability as Manipulability
@@ -230,6 +243,15 @@ if TYPE_CHECKING:  # editors and mypy see what __getattr__ finds
     from cartctl.tasks import Reference as Reference
     from cartctl.tasks import RelativeFrameTask as RelativeFrameTask
     from cartctl.tasks import Task as Task
+    from cartctl.wholepath import JointSpeed as JointSpeed
+    from cartctl.wholepath import LocalMethod as LocalMethod
+    from cartctl.wholepath import PathCost as PathCost
+    from cartctl.wholepath import Plan as Plan
+    from cartctl.wholepath import PlanReport as PlanReport
+    from cartctl.wholepath import PlanStatus as PlanStatus
+    from cartctl.wholepath import SquaredTorque as SquaredTorque
+    from cartctl.wholepath import Start as Start
+    from cartctl.wholepath import plan as plan
 
 
 def __getattr__(name: str) -> Any:

@@ -714,7 +714,7 @@ def test_a_verb_without_a_package_it_needs_points_to_doctor() -> None:
     assert result.returncode == 2 and b"cartctl doctor" in result.stderr and b"Traceback" not in result.stderr
 
 
-@pytest.mark.parametrize("verb", [[], ["track"], ["info"], ["doctor"]])
+@pytest.mark.parametrize("verb", [[], ["track"], ["plan"], ["info"], ["doctor"]])
 def test_help_shows_an_example(verb: list[str]) -> None:
     result = cartctl(*verb, "--help")
     assert result.exit_code == 0

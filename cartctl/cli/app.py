@@ -12,6 +12,7 @@ from cartctl.cli.calibrate import calibrate
 from cartctl.cli.compare import compare
 from cartctl.cli.doctor import doctor
 from cartctl.cli.info import info
+from cartctl.cli.plan import plan
 from cartctl.cli.track import track
 
 _EXAMPLE = "Example:  cartctl track panda --open"
@@ -55,5 +56,9 @@ app.command(
     "Header, for example:  panda_joint1 (deg),...,panda_joint7 (deg),x (mm),y (mm),z (mm)"
 )(calibrate)
 app.add_typer(bench, name="bench", epilog="Example:  cartctl bench run --scenarios arms --workers 2")
+app.command(
+    epilog="Example:  cartctl plan panda --closed --free-start --open\n\n"
+    "Example:  cartctl plan lwr --objective joint-speed --path polygon --samples 300"
+)(plan)
 app.command(epilog="Example:  cartctl info panda")(info)
 app.command(epilog="Example:  cartctl doctor")(doctor)

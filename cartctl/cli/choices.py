@@ -20,6 +20,14 @@ OBJECTIVES = (
     "gravity-torque",
     "none",
 )
+PLAN_OBJECTIVES = (
+    "kinetic-energy",
+    "joint-speed",
+    "joint-range",
+    "inverse-manipulability",
+    "self-clearance",
+    "torque",
+)
 
 
 class UnknownChoice(LookupFailure):

@@ -11,6 +11,7 @@ from cartctl.cli.choices import (
     METRICS,
     OBJECTIVES,
     PATHS,
+    PLAN_OBJECTIVES,
     PLANES,
     SINGULARITIES,
     completion,
@@ -154,3 +155,20 @@ OutDir = Annotated[Path, typer.Option("--out", metavar="DIR", rich_help_panel=_R
 Csv = Annotated[bool, typer.Option("--csv", rich_help_panel=_RESULT, help="Write a .csv, too.")]
 Parquet = Annotated[bool, typer.Option("--parquet", rich_help_panel=_RESULT, help="Write a .parquet, too.")]
 Open = Annotated[bool, typer.Option("--open", rich_help_panel=_RESULT, help="Open the HTML page in a browser.")]
+Cost = Annotated[
+    str,
+    typer.Option(
+        "--objective", metavar="NAME", rich_help_panel=_METHOD, autocompletion=words(PLAN_OBJECTIVES),
+        help=f"What is least over the whole path: {', '.join(PLAN_OBJECTIVES)}.",
+    ),
+]  # fmt: skip
+Samples = Annotated[
+    int, typer.Option("--samples", metavar="N", rich_help_panel=_METHOD, help="Configurations, both ends included.")
+]
+Closed = Annotated[bool, typer.Option("--closed", rich_help_panel=_METHOD, help="The joints end where they began.")]
+FreeStart = Annotated[
+    bool, typer.Option("--free-start", rich_help_panel=_METHOD, help="Start in the best posture instead of home.")
+]
+Unlimited = Annotated[
+    bool, typer.Option("--no-limits", rich_help_panel=_METHOD, help="Leave the joints' limits out of account.")
+]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Sequence
 from dataclasses import asdict, is_dataclass
 from datetime import datetime, timezone
 from importlib import metadata
@@ -127,7 +128,6 @@ class _TaskRows:
 
 def _meta(controller: Controller, interrupted: bool) -> dict[str, Any]:
     solver, robot = controller.solver, controller.robot
-    period = [list(map(float, p.cycle_times())) for p in _paths(controller) if p.closed]
     return {
         "robot": robot.spec,
         "robot_name": robot.name,
@@ -139,17 +139,27 @@ def _meta(controller: Controller, interrupted: bool) -> dict[str, Any]:
         "singularity": None if controller.singularity is None else repr(controller.singularity),
         "metric": controller.metric if isinstance(controller.metric, str) else type(controller.metric).__name__,
         "dt": controller.dt,
-        "cycles": period[0] if period else [],
+        "cycles": cycles_of([getattr(task, "target", None) for task in controller.tasks]),
         "interrupted": interrupted,
+        **provenance(),
+    }
+
+
+def cycles_of(targets: Sequence[Any]) -> list[float]:
+    """When the laps of the first closed path among the targets begin and end, s; nothing without one."""
+    for target in targets:
+        if hasattr(target, "cycle_times") and getattr(target, "closed", False):
+            return [float(t) for t in target.cycle_times()]
+    return []
+
+
+def provenance() -> dict[str, Any]:
+    """When a run was made, and by which versions."""
+    return {
         "date": datetime.now(timezone.utc).isoformat(timespec="seconds"),
         "versions": {name: _version(name) for name in ("cartctl", "pin", "numpy", "scipy")}
         | {"python": ".".join(map(str, sys.version_info[:3]))},
     }
-
-
-def _paths(controller: Controller) -> list[Any]:
-    targets = (getattr(task, "target", None) for task in controller.tasks)
-    return [target for target in targets if hasattr(target, "cycle_times") and hasattr(target, "closed")]
 
 
 def _parameters(solver: Any) -> dict[str, str]:

@@ -5,6 +5,7 @@ from cartctl.objectives.clearance import Clearance, SelfClearance, SmoothClearan
 from cartctl.objectives.function import FunctionObjective
 from cartctl.objectives.gravity_torque import GravityTorque
 from cartctl.objectives.inverse_condition import InverseCondition
+from cartctl.objectives.inverse_manipulability import InverseManipulability
 from cartctl.objectives.joint_range import JointRange
 from cartctl.objectives.kinetic_energy import KineticEnergy
 from cartctl.objectives.manipulability import Manipulability
@@ -20,6 +21,7 @@ __all__ = [
     "FunctionObjective",
     "GravityTorque",
     "InverseCondition",
+    "InverseManipulability",
     "JointRange",
     "KineticEnergy",
     "Manipulability",

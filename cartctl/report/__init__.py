@@ -13,15 +13,17 @@ if TYPE_CHECKING:
     from cartctl.report.calibration_page import write_calibration_html as write_calibration_html
     from cartctl.report.comparison import Comparison as Comparison
     from cartctl.report.html import write_html as write_html
+    from cartctl.report.planning import plot_plan as plot_plan
     from cartctl.report.plots import plot_run as plot_run
 
-__all__ = ["Comparison", "plot_calibration", "plot_run", "write_calibration_html", "write_html"]
+__all__ = ["Comparison", "plot_calibration", "plot_plan", "plot_run", "write_calibration_html", "write_html"]
 
 _HOMES = {
     "Comparison": "cartctl.report.comparison",
     "plot_calibration": "cartctl.report.calibration_figure",
     "write_calibration_html": "cartctl.report.calibration_page",
     "write_html": "cartctl.report.html",
+    "plot_plan": "cartctl.report.planning",
     "plot_run": "cartctl.report.plots",
 }
 
