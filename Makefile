@@ -6,7 +6,7 @@ READY  := $(VENV)/.ready
 JOBS   ?= 2
 MINUTES ?= 10
 
-.PHONY: help demo test lint bench soak docs clean
+.PHONY: help demo test lint bench race soak docs clean
 .DEFAULT_GOAL := help
 
 help:  ## what there is
@@ -34,6 +34,16 @@ bench: $(READY)  ## ten methods on nine arms in one table, and the time of one s
 	@OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python benchmarks/every_method.py
 	@$(BIN)/python benchmarks/step_time.py
 	@$(BIN)/python benchmarks/solver_time.py
+	@$(BIN)/python benchmarks/compiled_time.py
+
+race: $(READY)  ## cartctl and its peers on the same jobs, each in an environment of its own
+	@for peer in roboticstoolbox pink placo; do \
+	  test -x .race/$$peer/bin/python && continue; \
+	  pins=$$(sed -n 's/^requires: //p' benchmarks/race/*_$$peer.py); \
+	  $(PYTHON) -m venv .race/$$peer && .race/$$peer/bin/python -m pip install --quiet --disable-pip-version-check $$pins \
+	    || { echo "$$peer cannot be installed here and is left out"; rm -rf .race/$$peer; }; \
+	done
+	@$(BIN)/python benchmarks/race/race.py --save
 
 soak: $(READY)  ## random problems and closed loops for MINUTES on all cores, every answer checked
 	@$(BIN)/python benchmarks/soak.py --minutes $(MINUTES)

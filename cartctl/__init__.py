@@ -47,6 +47,7 @@ _HOMES = {
     "cartctl.solvers.dls": ("DLS",),
     "cartctl.solvers.projected_gradient": ("ProjectedGradient",),
     "cartctl.solvers.task_priority": ("TaskPriority",),
+    "cartctl.compiled.reach": ("InverseKinematics", "Reached", "inverse_kinematics"),
     "cartctl.model.library": ("robots",),
     "cartctl.model.limits": ("Limits",),
     "cartctl.model.loading": ("load", "planar"),
@@ -94,6 +95,8 @@ _HOMES = {
     "cartctl.motion.free": ("FreeMotion", "free_motion"),
     "cartctl.motion.plant": ("Plant",),
     "cartctl.motion.controller": ("Controller",),
+    "cartctl.motion.batch": ("simulate_batch",),
+    "cartctl.motion.batch_run": ("Batch",),
     "cartctl.motion.simulate": ("simulate",),
     "cartctl.motion.run": ("Run", "TaskRecord"),
     "cartctl.motion.metrics": ("JointMetrics", "Metrics", "TaskMetrics"),
@@ -147,6 +150,9 @@ if TYPE_CHECKING:  # editors and mypy see what __getattr__ finds
     from cartctl.calibration.calibrate import calibrate as calibrate
     from cartctl.calibration.dh_chain import DHChain as DHChain
     from cartctl.calibration.result import Calibration as Calibration
+    from cartctl.compiled.reach import InverseKinematics as InverseKinematics
+    from cartctl.compiled.reach import Reached as Reached
+    from cartctl.compiled.reach import inverse_kinematics as inverse_kinematics
     from cartctl.constraints import Avoid as Avoid
     from cartctl.constraints import AvoidSelf as AvoidSelf
     from cartctl.constraints import Constraint as Constraint
@@ -173,6 +179,8 @@ if TYPE_CHECKING:  # editors and mypy see what __getattr__ finds
     from cartctl.model.scene import Scene as Scene
     from cartctl.model.state import State as State
     from cartctl.model.wrench import Wrench as Wrench
+    from cartctl.motion.batch import simulate_batch as simulate_batch
+    from cartctl.motion.batch_run import Batch as Batch
     from cartctl.motion.controller import Controller as Controller
     from cartctl.motion.energy import EnergyBooks as EnergyBooks
     from cartctl.motion.free import FreeMotion as FreeMotion

@@ -137,3 +137,40 @@ def test_old_caches_are_pruned_and_strangers_are_left_alone(compiled, tmp_path):
 def test_importing_kernels_does_not_import_numba():
     code = "import sys; import cartctl.solvers.dls, cartctl.spatial; print(int('numba' in sys.modules))"
     assert run(code) == 0
+
+
+@pytest.mark.skipif(os.name != "posix", reason="POSIX terminals")
+@pytest.mark.parametrize("terminal", [True, False])
+def test_a_long_compilation_is_announced_once_to_a_terminal(terminal, tmp_path):
+    """What takes longer than the patience allowed says so, once a process, and not where nobody waits."""
+    import pty
+
+    code = """
+import numpy as np
+from cartctl import kernels, spatial
+from cartctl.solvers.dls import damped_solve
+kernels._SLOW = PATIENCE
+damped_solve(np.ones((1, 2)), np.ones(1), 1.0)
+spatial.log3(np.eye(3))
+"""
+    ours, theirs = pty.openpty()
+    env = {**os.environ, "PYTHONPATH": os.pathsep.join(p for p in sys.path if p), "CARTCTL_CACHE_DIR": str(tmp_path)}
+    told = []
+    for patience in ("0.1", "60.0"):  # the second time nobody has waited for long
+        process = subprocess.Popen(
+            [sys.executable, "-c", code.replace("PATIENCE", patience)],
+            env=env,
+            stderr=theirs if terminal else subprocess.PIPE,
+            text=True,
+        )
+        piped = process.communicate()[1] or ""
+        assert process.returncode == 0, piped
+        os.set_blocking(ours, False)
+        try:
+            told.append(os.read(ours, 4096).decode() if terminal else piped)
+        except BlockingIOError:
+            told.append("")
+    os.close(ours)
+    os.close(theirs)
+    assert told[0].count("cartctl is compiling (once, then kept on disk)") == int(terminal)
+    assert told[1] == ""

@@ -101,6 +101,11 @@ class Approach:
         self._walls = Walls(_NOTHING, _NOTHING, np.zeros((0, 0)), _NOTHING, _NOTHING)
         self._directions, self._bend, self._hold = directions.compiled, bend.compiled, hold.compiled
 
+    @property
+    def joints(self) -> FloatArray:
+        """(3, nv) what each joint can slow down by, its top speed, and the bound that counts as standing still."""
+        return self._joints
+
     def begin(
         self,
         state: State,
@@ -147,10 +152,21 @@ class Approach:
         walls = self._walls if reference.rate is None else self._walls.box()  # before a wall one stops, or slides on
         bounded = walls.lower.shape[0] > 0
         self._directions(J, b, y, rate, error, self._joints, *walls, self._dt, size, bounded, U, Vt, D)
+        self._curvatures(task, state, U, Vt, D, error)
+        return Directions(U, Vt, D, size)
+
+    def _curvatures(
+        self, task: Task, state: State, U: FloatArray, Vt: FloatArray, D: FloatArray, error: FloatArray
+    ) -> None:
+        """D[BEND] and D[PULL] of the directions whose curvature matters."""
         asked = np.flatnonzero(D[ASKED])
         if asked.shape[0]:
-            self._bend(error, U, asked, task.curvatures(state, Vt if asked.shape[0] == k else Vt[asked]), D)
-        return Directions(U, Vt, D, size)
+            along = Vt if asked.shape[0] == D.shape[1] else Vt[asked]
+            self._bend(error, U, asked, task.curvatures(state, along), D)
+
+    def _drift(self, task: Task, state: State, v: FloatArray) -> FloatArray:
+        """``J_dot(v) v`` (m,) of a task at another velocity."""
+        return task.curvatures(state, v[None])[:, 0]
 
     def _pace(self, task: Task, state: State, found: Directions, reference: Reference) -> float:
         """The share of its speed at which the joints' accelerations can follow the path's bends.
@@ -161,7 +177,7 @@ class Approach:
         assert rate is not None and acceleration is not None
         s = found.D[SIGMA]
         solve = (found.Vt.T * (s / (s * s + (_CLEAR * found.size) ** 2))) @ found.U.T
-        bend = np.abs(solve @ (acceleration - task.curvatures(state, (solve @ rate)[None])[:, 0]))
+        bend = np.abs(solve @ (acceleration - self._drift(task, state, solve @ rate)))
         with np.errstate(divide="ignore"):
             room = float(np.min(self._joints[SLOWING] / bend))
         return min(1.0, math.sqrt(_BENDS * room))

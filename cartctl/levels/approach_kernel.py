@@ -82,14 +82,14 @@ def directions(
                 speed = min(speed, joints[TOP_SPEED, j] / share)
         D[SIGMA, k], D[FORWARD, k], D[FEEDBACK, k], D[ERROR, k] = s[k], forward, total - forward, abs(e)
         D[AVAILABLE, k], D[SPEED, k], D[BEND, k], D[PULL, k], D[NEXT, k] = available, speed, 0.0, 0.0, following
-        asked = _matters(D[:, k], total - forward, far, size, dt)
+        asked = matters(D[:, k], total - forward, far, size, dt)
         if y.shape[0] > 0:
-            asked = asked or _matters(D[:, k], following - forward, far, size, dt)
+            asked = asked or matters(D[:, k], following - forward, far, size, dt)
         D[ASKED, k] = 1.0 if asked and s[k] > _NOTHING * size else 0.0
 
 
 @part
-def _matters(d: FloatArray, feedback: float, far: float, size: float, dt: float) -> bool:
+def matters(d: FloatArray, feedback: float, far: float, size: float, dt: float) -> bool:
     """Whether the largest possible curvature would hold back this direction, or what ranks below it."""
     s, total, curved = d[SIGMA], abs(d[FORWARD] + feedback), _CURVED * size
     squared = s * s

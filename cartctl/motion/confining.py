@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Sequence
+from contextlib import suppress
 
 from cartctl.algebra.problem import Equation, Problem
 from cartctl.checks import FloatArray
+from cartctl.compiled.approach import TreeApproach
+from cartctl.compiled.tree import tree_of
 from cartctl.constraints import Box, Constraint, stacked
-from cartctl.errors import CartctlWarning, ParameterError, UnsupportedProblem
+from cartctl.errors import CartctlWarning, ParameterError, UnsupportedJoint, UnsupportedProblem
 from cartctl.levels import Level
 from cartctl.levels.approach import Approach
 from cartctl.levels.base import UNCONFINED, Confines
@@ -56,7 +59,7 @@ class Confining:
             else:
                 _warn_of_rows(solver, level)
             if approach and level.approaching is not None:
-                self._approach = level.approaching(limits, dt, solver, waiting)
+                self._approach = _approach(level.approaching, robot, limits, dt, solver, waiting)
         elif joints or jerk:
             what = "disabled" if joints else "jerk"
             raise ParameterError(f"{what} is given without limits; expected limits= for it to be a part of")
@@ -79,6 +82,16 @@ class Confining:
             self._bounds.reset()
         if self._approach is not None:
             self._approach.reset()
+
+    def compiled(self) -> tuple[FloatArray | None, FloatArray | None]:
+        """Limits (11, nv) and the approach's figures of the joints (3, nv), None without; raises UnsupportedProblem."""
+        if self._constraints:
+            raise UnsupportedProblem(f"a constraint is not compiled: {type(self._constraints[0]).__name__}")
+        if self._bounds is None:
+            return None, None
+        if self._bounds.jerk:
+            raise UnsupportedProblem("jerk limits are not compiled")
+        return self._bounds.packed, None if self._approach is None else self._approach.joints
 
     def at(self, state: State) -> Confines:
         """What confines u at a state."""
@@ -126,6 +139,16 @@ class Confining:
             if not stopped.failed:
                 break
         return stopped.u
+
+
+def _approach(
+    kind: type[Approach], robot: Robot, limits: Limits, dt: float, solver: Solver, waiting: Sequence[Task]
+) -> Approach:
+    """The level's own, or where the robot is a compiled tree, the same without Pinocchio."""
+    if kind is Approach:
+        with suppress(UnsupportedJoint):
+            return TreeApproach(limits, dt, solver, waiting, tree_of(robot))
+    return kind(limits, dt, solver, waiting)
 
 
 def _itself(q: FloatArray) -> FloatArray:

@@ -137,6 +137,15 @@ class Controller:
         self._confining = self._confined_by(limits)
         self._limits = limits
 
+    def compiled_limits(self) -> tuple[FloatArray | None, FloatArray | None, list[bool]]:
+        """What a compiled loop needs to know of the limits: (11, nv), (3, nv) of the approach, and whose paths wait.
+
+        Raises UnsupportedProblem for what such a loop does not hold: constraints, jerk limits, approaches of others.
+        """
+        packed, braking = self._confining.compiled()
+        waits = [task in self._waiting for task in self.tasks]
+        return packed, braking, waits
+
     def _confined_by(self, limits: Limits | None) -> Confining:
         given = (self._constraints, self._disabled, self._jerk, self._approach)
         return Confining(self.robot, self.level, self.solver, limits, *given, self.dt, self._waiting)

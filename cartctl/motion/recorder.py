@@ -14,6 +14,7 @@ import numpy as np
 from cartctl.algebra.svd import singular_values
 from cartctl.checks import FloatArray
 from cartctl.levels import Command
+from cartctl.model.state import State
 from cartctl.motion.controller import Controller
 from cartctl.motion.mover import Driven, Mover
 from cartctl.motion.run import Run, TaskRecord
@@ -91,6 +92,44 @@ class Recorder:
             obstacles=self._around.records(samples),
             robot=controller.robot,
         )
+
+
+def run_of_states(
+    controller: Controller,
+    time: FloatArray,
+    q: FloatArray,
+    v: FloatArray,
+    scales: FloatArray,
+    status: list[str],
+    own: FloatArray,
+    step_time: float,
+) -> Run:
+    """A Run of N steps made elsewhere at the velocity level: states (N+1, ...), scales (N, p), own times (N+1, p)."""
+    robot, tasks = controller.robot, controller.tasks
+    n, state = len(status), State(robot)
+    rows = [_TaskRows(task.units(robot), robot.nv, n) for task in tasks]
+    anchors: list[Any] = []
+    for k in range(n + 1):
+        state.set(q[k], v[k], float(time[k]))
+        anchors = anchors or [task.anchor(state) for task in tasks]
+        for i, (row, task) in enumerate(zip(rows, tasks, strict=True)):
+            t = float(own[k, i])
+            row.error[k] = task.reference(state, t, anchors[i]).error
+            row.singular[k] = singular_values(np.asfortranarray(task.jacobian(state)))
+            row.see(k, task.observe(state, t, anchors[i]))
+    for i, row in enumerate(rows):
+        row.scale[:] = scales[:, i]
+    return Run(
+        meta=_meta(controller, False),
+        time=time.copy(),
+        q=q.copy(),
+        v=v.copy(),
+        command=v[1:].copy(),
+        status=status,
+        solve_time=np.full(n, step_time),
+        tasks=[row.record(task, n, n + 1) for row, task in zip(rows, tasks, strict=True)],
+        robot=robot,
+    )
 
 
 class _TaskRows:

@@ -5,37 +5,47 @@ from __future__ import annotations
 import numpy as np
 
 from cartctl.checks import FloatArray
-from cartctl.kernels import kernel
+from cartctl.kernels import kernel, lean_part
 
 
 @kernel("void(vector, matrix, vector, matrix, out_vector)")
 def pose_error(p: FloatArray, R: FloatArray, p_d: FloatArray, R_d: FloatArray, error: FloatArray) -> None:
-    """Fill error (6,) with ``[p_d - p; log3(R_d R^T)]``.
-
-    The logarithm goes through the quaternion (w, x, y, z) with the largest component first (Shepperd 1978), which is
-    as exact at a half turn as near the identity.
-    """
-    E = np.empty((3, 3))
+    """Fill error (6,) with ``[p_d - p; log3(R_d R^T)]``."""
     for i in range(3):
         error[i] = p_d[i] - p[i]
-        for j in range(3):
-            E[i, j] = R_d[i, 0] * R[j, 0] + R_d[i, 1] * R[j, 1] + R_d[i, 2] * R[j, 2]
-    trace = E[0, 0] + E[1, 1] + E[2, 2]
-    if trace >= E[0, 0] and trace >= E[1, 1] and trace >= E[2, 2]:
-        w, x, y, z = 1.0 + trace, E[2, 1] - E[1, 2], E[0, 2] - E[2, 0], E[1, 0] - E[0, 1]
-    elif E[0, 0] >= E[1, 1] and E[0, 0] >= E[2, 2]:
-        w, x = E[2, 1] - E[1, 2], 1.0 + E[0, 0] - E[1, 1] - E[2, 2]
-        y, z = E[0, 1] + E[1, 0], E[0, 2] + E[2, 0]
-    elif E[1, 1] >= E[2, 2]:
-        w, y = E[0, 2] - E[2, 0], 1.0 - E[0, 0] + E[1, 1] - E[2, 2]
-        x, z = E[0, 1] + E[1, 0], E[1, 2] + E[2, 1]
+    error[3], error[4], error[5] = logarithm(
+        R_d[0, 0] * R[0, 0] + R_d[0, 1] * R[0, 1] + R_d[0, 2] * R[0, 2],
+        R_d[0, 0] * R[1, 0] + R_d[0, 1] * R[1, 1] + R_d[0, 2] * R[1, 2],
+        R_d[0, 0] * R[2, 0] + R_d[0, 1] * R[2, 1] + R_d[0, 2] * R[2, 2],
+        R_d[1, 0] * R[0, 0] + R_d[1, 1] * R[0, 1] + R_d[1, 2] * R[0, 2],
+        R_d[1, 0] * R[1, 0] + R_d[1, 1] * R[1, 1] + R_d[1, 2] * R[1, 2],
+        R_d[1, 0] * R[2, 0] + R_d[1, 1] * R[2, 1] + R_d[1, 2] * R[2, 2],
+        R_d[2, 0] * R[0, 0] + R_d[2, 1] * R[0, 1] + R_d[2, 2] * R[0, 2],
+        R_d[2, 0] * R[1, 0] + R_d[2, 1] * R[1, 1] + R_d[2, 2] * R[1, 2],
+        R_d[2, 0] * R[2, 0] + R_d[2, 1] * R[2, 1] + R_d[2, 2] * R[2, 2],
+    )
+
+
+@lean_part
+def logarithm(
+    xx: float, xy: float, xz: float, yx: float, yy: float, yz: float, zx: float, zy: float, zz: float
+) -> tuple[float, float, float]:
+    """The angle-axis vector of a rotation, row by row.
+
+    It goes through the quaternion (w, x, y, z) with the largest component first (Shepperd 1978), which is as exact at a
+    half turn as near the identity.
+    """
+    trace = xx + yy + zz
+    if trace >= xx and trace >= yy and trace >= zz:
+        w, x, y, z = 1.0 + trace, zy - yz, xz - zx, yx - xy
+    elif xx >= yy and xx >= zz:
+        w, x, y, z = zy - yz, 1.0 + xx - yy - zz, xy + yx, xz + zx
+    elif yy >= zz:
+        w, x, y, z = xz - zx, xy + yx, 1.0 - xx + yy - zz, yz + zy
     else:
-        w, z = E[1, 0] - E[0, 1], 1.0 - E[0, 0] - E[1, 1] + E[2, 2]
-        x, y = E[0, 2] + E[2, 0], E[1, 2] + E[2, 1]
+        w, x, y, z = yx - xy, xz + zx, yz + zy, 1.0 - xx - yy + zz
     if w < 0.0:
         w, x, y, z = -w, -x, -y, -z
     sine = np.sqrt(x * x + y * y + z * z)
     factor = 2.0 / w if sine < 1e-9 * w else 2.0 * np.arctan2(sine, w) / sine
-    error[3] = factor * x
-    error[4] = factor * y
-    error[5] = factor * z
+    return factor * x, factor * y, factor * z

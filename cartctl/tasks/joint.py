@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cartctl.checks import FloatArray
-from cartctl.errors import ParameterError, TargetError
+from cartctl.errors import ParameterError, TargetError, UnsupportedProblem
 from cartctl.model.robot import Robot
 from cartctl.model.state import State
 from cartctl.tasks.base import Reference, Task
@@ -86,6 +86,12 @@ class JointTask(Task):
         for part in (wanted, rate, acceleration):
             self._expect(part, len(values))
         return Reference(self._shortest(state.robot, wanted - values), rate, acceleration)
+
+    def fixed_target(self, robot: Robot) -> tuple[NDArray[np.intp], FloatArray | None]:
+        """Tangent coordinates (m,), their target or None for what the first step finds; raises UnsupportedProblem."""
+        if self._path is not None:
+            raise UnsupportedProblem(f"task {self.name!r} follows a path of joint coordinates")
+        return self._rows(robot)[0], self._point if self._point is not None else self._default(robot, None)
 
     def _default(self, robot: Robot, anchor: FloatArray | None) -> FloatArray | None:
         """The target where none is given: what the first step found."""

@@ -103,6 +103,11 @@ class PoseTask(Task):
         p, R = self.pose(state)
         return Anchor(np.array(p), np.array(R))
 
+    @property
+    def path(self) -> Callable[[float], Any] | None:
+        """The path that the target follows, None where it rests."""
+        return self._path
+
     def goal(self, t: float) -> Any:
         """The target at time t: a Goal or a path's sample."""
         return self._goal if self._path is None else read(self._path(t), f"task {self.name!r}")
