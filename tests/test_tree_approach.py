@@ -16,7 +16,7 @@ def pair(robot: cc.Robot, tasks: list[cc.Task], **given) -> tuple[cc.Controller,
     """The controller as it is made, and one whose approach asks Pinocchio."""
     ours, theirs = (cc.Controller(robot, tasks, solver="sns", **given) for _ in range(2))
     assert type(ours._confining._approach) is TreeApproach
-    theirs._confining._approach = Approach(robot.limits, theirs.dt, cc.State(robot), theirs.solver, theirs._waiting)
+    theirs._confining._approach = Approach(robot.limits, theirs.dt, theirs.solver, theirs._waiting)
     return ours, theirs
 
 
