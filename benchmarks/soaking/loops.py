@@ -95,9 +95,7 @@ class Loop:
             a = (v - before) / dt
             moved[0], moved[1], moved[2], moved[3] = robot.coordinates(q), v, a, (a - a_before) / dt
             self.made += 1
-            if (
-                solution.status is cc.Status.YIELDED
-            ):  # torques first: limits that contradict them were left, and it says so
+            if solution.yielded:  # limits that contradict torques were left, in the order that is documented
                 self.statuses[solution.status.name] += 1
                 return ""
             what = self._judged(moved, solution)
