@@ -223,12 +223,21 @@ def test_results_take_the_path_as_text(tmp_path: Path) -> None:
         results(3)  # type: ignore[arg-type]
 
 
+@pytest.mark.parametrize("rows", [[], "x", [{}], None])
+def test_a_report_of_no_results_is_refused(tmp_path: Path, rows: Any) -> None:
+    with pytest.raises(ParameterError, match=r"rows is .*; expected the rows of cc\.bench\.results"):
+        bench.report(rows, tmp_path / "report")
+    with pytest.raises(ParameterError, match="replays is -1"):
+        bench.report(rows, tmp_path / "report", replays=-1)
+    assert not (tmp_path / "report").exists()
+
+
 def test_steps_are_kept_on_request(tmp_path: Path) -> None:
     bench.run(short(), "pinv", out=tmp_path, keep_steps=True)
     (row,) = results(tmp_path)
     run = cc.Run.load(tmp_path / "steps" / f"{row['key']}.npz")
     assert len(run) == row["steps"] == 10 and run.metrics().tasks[0].rms_m == row["rms_m"]
-    assert np.array_equal(bench.replay(row, tmp_path / "steps").q, run.q)
+    assert np.array_equal(bench.replay(row, str(tmp_path / "steps")).q, run.q)
     assert np.array_equal(bench.replay(row).q, run.q)  # made again, to the last bit
 
 
