@@ -110,6 +110,15 @@ def number(name: str, value: Any, *, low: float = -math.inf, high: float = math.
     return x
 
 
+def whole(name: str, value: Any, least: int, most: int | None = None) -> int:
+    """``value`` as a whole number in [least, most]; raises ParameterError."""
+    fits_in = not isinstance(value, bool) and isinstance(value, (int, np.integer))
+    if not fits_in or value < least or (most is not None and value > most):
+        interval = f"of at least {least}" if most is None else f"from {least} to {most}"
+        raise ParameterError(f"{name} is {_short(value)}; expected a whole number {interval}")
+    return int(value)
+
+
 def amounts(name: str, value: Any, wanted: str = "numbers of at least 0") -> float | FloatArray:
     """``value`` as a number >= 0, or a vector of them; raises ParameterError, ShapeError, NonFiniteError."""
     if np.ndim(value) == 0:

@@ -22,7 +22,7 @@ from cartctl.bench import engines, runner
 from cartctl.bench.journal import Journal, read
 from cartctl.bench.schema import COLUMNS, VERSION
 from cartctl.bench.table import results
-from cartctl.errors import BenchError, LevelNotFound, ParameterError, ResultFileError
+from cartctl.errors import BenchError, LevelNotFound, ParameterError, ResultFileError, ShapeError
 from tests.bench_scenarios import SOLVERS, short, toml
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -40,10 +40,11 @@ def environment() -> dict[str, str]:
 def bench_process(folder: Path, file: Path, *more: str) -> subprocess.Popen[bytes]:
     """``cartctl bench run`` in a session of its own, so that its workers can be killed with it."""
     command = [sys.executable, "-m", "cartctl", "bench", "run", "--scenarios", str(file), "--out", str(folder)]
-    return subprocess.Popen(
-        [*command, "--solvers", ",".join(SOLVERS), *more], env=environment(), start_new_session=True,
-        stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
-    )  # fmt: skip
+    with (folder.parent / "told").open("wb") as told:
+        return subprocess.Popen(
+            [*command, "--solvers", ",".join(SOLVERS), *more], env=environment(), start_new_session=True,
+            stdout=subprocess.DEVNULL, stderr=told,
+        )  # fmt: skip
 
 
 def wait_for_lines(folder: Path, count: int, process: subprocess.Popen[bytes], patience: float = 120.0) -> None:
@@ -187,9 +188,48 @@ def test_a_real_ctrl_c_ends_it_in_order(tmp_path: Path, workers: int) -> None:
     wait_for_lines(out, 4, process)
     os.killpg(process.pid, signal.SIGINT)
     assert process.wait(timeout=120) == 130
+    assert "Traceback" not in (tmp_path / "told").read_text()  # nor does a worker show one
     kept = keys_of(out)
     assert 4 <= len(kept) < 36 and [r["key"] for r in results(out / "results.parquet")] == kept
     assert bench.run(str(file), SOLVERS, out=out).found == len(kept)
+
+
+@pytest.mark.parametrize(
+    ("given", "error", "words"),
+    [
+        ({"scenarios": 3}, ShapeError, "scenarios is 3; expected a list"),
+        ({"solvers": 3}, ShapeError, "solvers is 3; expected a list"),
+        ({"solvers": []}, ParameterError, "solvers is empty"),
+        ({"solvers": {}}, ParameterError, "solvers is empty"),
+        ({"levels": "velcity"}, LevelNotFound, "did you mean 'velocity'"),
+        ({"levels": 3}, ShapeError, "levels is 3; expected a list"),
+        ({"keep_steps": "all"}, ParameterError, "keep_steps is 'all'"),
+        ({"tell": 3}, ParameterError, "tell is a int"),
+        ({"out": 3}, ParameterError, "out is a int"),
+    ],
+)
+def test_what_is_no_argument_is_named(tmp_path: Path, given: Any, error: Any, words: str) -> None:
+    with pytest.raises(error, match=words):
+        bench.run(**{"scenarios": short(), "solvers": "pinv", "out": tmp_path / "out", **given})
+    assert not (tmp_path / "out").exists()
+
+
+def test_results_take_the_path_as_text(tmp_path: Path) -> None:
+    bench.run(short(), "pinv", out=str(tmp_path), levels="velocity")
+    assert len(results(str(tmp_path))) == 1
+    with pytest.raises(ResultFileError, match="no such file"):
+        results(str(tmp_path / "nowhere"))
+    with pytest.raises(ParameterError, match="place is a int"):
+        results(3)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("rows", [[], "x", [{}], None])
+def test_a_report_of_no_results_is_refused(tmp_path: Path, rows: Any) -> None:
+    with pytest.raises(ParameterError, match=r"rows is .*; expected the rows of cc\.bench\.results"):
+        bench.report(rows, tmp_path / "report")
+    with pytest.raises(ParameterError, match="replays is -1"):
+        bench.report(rows, tmp_path / "report", replays=-1)
+    assert not (tmp_path / "report").exists()
 
 
 def test_steps_are_kept_on_request(tmp_path: Path) -> None:
@@ -197,7 +237,7 @@ def test_steps_are_kept_on_request(tmp_path: Path) -> None:
     (row,) = results(tmp_path)
     run = cc.Run.load(tmp_path / "steps" / f"{row['key']}.npz")
     assert len(run) == row["steps"] == 10 and run.metrics().tasks[0].rms_m == row["rms_m"]
-    assert np.array_equal(bench.replay(row, tmp_path / "steps").q, run.q)
+    assert np.array_equal(bench.replay(row, str(tmp_path / "steps")).q, run.q)
     assert np.array_equal(bench.replay(row).q, run.q)  # made again, to the last bit
 
 

@@ -72,7 +72,7 @@ def test_a_file_is_read_with_its_defaults(tmp_path: Path) -> None:
         ("dt = 0.01", "dt = -0.01", 6, "dt is -0.01; expected a number above 0"),
         ('robot = "planar3R"', 'robot = "planar3Q"', 7, "did you mean 'planar3R'"),
         ("radius = 0.2", "radius = 0.0", 13, "scenario[0].tasks[0].target.radius"),
-        ("radius = 0.2", "radios = 0.2", 13, "radius is missing"),
+        ("radius = 0.2", "radios = 0.2", 13, "radius is missing; is it 'radios'?"),
         ('kind = "circle"', 'kind = "circel"', 13, "did you mean 'circle'?"),
         ('{ kind = "posture", gain = 2.0 }', '{ kind = "posture", gian = 2.0 }', 14, "did you mean 'gain'?"),
         ('kind = "posture", gain', 'kind = "posture", posture = { elbow = 1 }, gain', 14, "unknown joint 'elbow'"),
@@ -81,7 +81,12 @@ def test_a_file_is_read_with_its_defaults(tmp_path: Path) -> None:
         ("offset = [0.1, 0.0, 0.0]", "offset = [0.1, 0.0]", 25, "offset has shape (2,); expected (3,)"),
         ("offset = [0.1, 0.0, 0.0]", "offset = [0.0, 0.0, 0.0]", 23, "scenario[1].tasks[0].target"),
         ('name = "second"', 'name = "first"', 18, "is there twice"),
-        ('name = "second"\nduration = 1.0', 'name = "second"\nduraton = 1.0', 17, "duration is missing"),
+        (
+            'name = "second"\nduration = 1.0',
+            'name = "second"\nduraton = 1.0',
+            17,
+            "duration is missing; is it 'duraton'?",
+        ),
         ('name = "second"', 'name = "second"\nlevles = ["velocity"]', 19, "did you mean 'levels'?"),
         ('name = "second"', 'name = "second"\nlevels = ["torqe"]', 19, "did you mean 'torque'?"),
         ('[set]\ntitle = "mine"', '[sett]\ntitle = "mine"', 2, "did you mean 'set'?"),
@@ -99,7 +104,7 @@ def test_what_is_wrong_is_named_by_line_and_key(tmp_path: Path, old: str, new: s
 
 def test_files_that_are_none_are_refused(tmp_path: Path) -> None:
     assert "at least one [[scenario]]" in str(refused(tmp_path, "scenario = []\n"))
-    assert "scenario is missing" in str(refused(tmp_path, ""))
+    assert "scenario is missing; expected it here" in str(refused(tmp_path, ""))
     with pytest.raises(ScenarioError, match=r"nowhere\.toml cannot be read: No such file"):
         sets.select([str(tmp_path / "nowhere.toml")])
 

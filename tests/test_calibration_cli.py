@@ -230,6 +230,12 @@ def test_bad_options_are_one_line(folder: Path, options: tuple[str, ...], words:
     assert not Path("out").exists() or not os.listdir("out")
 
 
+def test_a_folder_that_cannot_be_had_is_said_before_the_work(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    Job(folder / "m.csv", far=False)
+    monkeypatch.setattr("cartctl.calibration.gauss_newton._descend", pytest.fail)
+    assert "--out is 'm.csv'" in the_error(cartctl("calibrate", "m.csv", "--robot", "lwr", "--out", "m.csv"))
+
+
 def test_help_shows_an_example() -> None:
     result = cartctl("calibrate", "--help")
     text = " ".join(result.output.split())

@@ -168,10 +168,15 @@ def test_misuse_is_refused():
     (target,) = poses(robot, 1, seed=4)
     bent = target.homogeneous
     bent[0, 0] += 0.1
+    far = target.homogeneous
+    far[0, 3] = 1e200  # whose square is no number any more
     wrong = [
         (cc.errors.TargetError, "shape", {"targets": np.zeros((2, 3))}),
         (cc.errors.TargetError, r"targets\[1\] is off a pose", {"targets": [target.homogeneous, bent]}),
         (cc.errors.NonFiniteError, "nan", {"targets": np.full((4, 4), np.nan)}),
+        (cc.errors.TargetError, "expected a pose", {"targets": cc.Line(target, [0.5, 0.0, 0.5], duration=1.0)}),
+        (cc.errors.TargetError, "expected a pose", {"targets": [target, "home"]}),
+        (cc.errors.ParameterError, r"targets\[0, 0, 3\] is 1e\+200", {"targets": far}),
         (cc.errors.FrameNotFound, "hand", {"frame": "panda_hnd"}),
         (cc.errors.ShapeError, "q0 has shape", {"q0": np.zeros(6)}),
         (cc.errors.ParameterError, "restarts", {"restarts": -1}),

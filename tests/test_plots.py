@@ -10,10 +10,12 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 import pytest
+from matplotlib.figure import Figure
 
 from cartctl.errors import ParameterError
 from cartctl.motion.run import Run
 from cartctl.report import plot_run
+from cartctl.report.axes import logarithmic
 from cartctl.report.palette import COLORS, NAMED, POINTS, pens, plain, thinned
 from tests.report_runs import planar_run, robot_of, run_of
 
@@ -217,6 +219,15 @@ def test_thinning_keeps_every_peak_and_trough(rng: np.random.Generator) -> None:
     assert y.max() == 50.0 and t[y.argmax()] == time[12_345] and y.min() == -40.0 and t[y.argmin()] == time[77_777]
     same = thinned(time[:POINTS], values[:POINTS])
     assert len(same[0]) == POINTS
+
+
+def test_a_curve_of_one_value_is_drawn_without_a_warning() -> None:
+    axes = Figure().add_subplot()
+    axes.plot([0.0, 1.0], [0.2, 0.2])
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        logarithmic(axes)
+    assert axes.get_yscale() == "log" and axes.get_ylim() == pytest.approx((0.125, 0.5))
 
 
 def test_pens_differ_until_they_run_out() -> None:

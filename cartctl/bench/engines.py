@@ -7,6 +7,7 @@ memory. A worker that dies takes nothing along but the job it was at, which is d
 from __future__ import annotations
 
 import os
+import signal
 from collections.abc import Callable, Iterable, Iterator
 from itertools import chain, islice
 from typing import Any
@@ -26,8 +27,14 @@ def here(jobs: Iterable[Job]) -> Iterator[Result]:
         yield perform(job)
 
 
+def _deaf(job: Job) -> Result:
+    """A job in a process of its own. A terminal's Ctrl-C reaches all processes; only the one in charge answers it."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    return perform(job)
+
+
 def processes(workers: int) -> Engine:
-    """In that many processes of this machine, one BLAS thread each."""
+    """In that many processes of this machine, at least two, one BLAS thread each."""
 
     def engine(jobs: Iterable[Job]) -> Iterator[Result]:
         from joblib import Parallel, delayed
@@ -39,7 +46,7 @@ def processes(workers: int) -> Engine:
         def handed_out(source: Iterable[Job]) -> Iterator[Any]:
             for job in source:
                 waiting[job.key] = job
-                yield delayed(perform)(job)
+                yield delayed(_deaf)(job)
 
         stream = iter(jobs)
         while True:

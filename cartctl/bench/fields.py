@@ -43,7 +43,11 @@ class Fields:
         self._known.append(key)
         if key not in self._left:
             if default is _REQUIRED:
-                raise ScenarioError(f"{key} is missing; expected it here")
+                # A misspelt key is no key and leaves its right name missing: of the two the typing error is the news.
+                typed = get_close_matches(
+                    key, [str(left) for left in self._left if left not in self._known], n=1, cutoff=0.75
+                )
+                raise ScenarioError(f"{key} is missing; " + (f"is it {typed[0]!r}?" if typed else "expected it here"))
             return default  # type: ignore[no-any-return]
         with under(key):
             return check(key, self._left.pop(key))

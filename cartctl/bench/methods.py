@@ -7,6 +7,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import MISSING, Field, dataclass, fields, is_dataclass
 from typing import Any
 
+from cartctl import checks
 from cartctl.bench.peers import peers
 from cartctl.errors import LookupFailure, ParameterError
 from cartctl.solvers import Solver, solver_class, solvers
@@ -44,10 +45,13 @@ def methods(chosen: Iterable[str] | Mapping[str, Solver | str] = ("all",)) -> li
     A mapping gives solvers of one's own a name: ``{"mine": MySolver(), "sns": "sns"}``. Raises MethodNotFound,
     ParameterError.
     """
-    if isinstance(chosen, Mapping):
+    if isinstance(chosen, Mapping) and chosen:
         return [_named(name, solver) for name, solver in chosen.items()]
     if isinstance(chosen, str):
         chosen = [chosen]
+    chosen = checks.listed("solvers", chosen)
+    if not chosen:
+        raise ParameterError("solvers is empty; expected names such as 'sns', or a mapping of names to solvers")
     names: list[str] = []
     for name in chosen:
         names += list(solvers()) if name == "all" else list(peers()) if name == "peers" else [name]

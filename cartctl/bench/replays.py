@@ -20,12 +20,12 @@ from cartctl.motion.run import Run
 FOLDER = "replays"
 
 
-def replay(row: Row, steps: Path | None = None) -> Run:
+def replay(row: Row, steps: str | Path | None = None) -> Run:
     """The run of a row: from its .npz in ``steps`` where that is, else made again; raises BenchError.
 
     Raises where the method is none of the registry with its default parameters, which cannot be made from a row.
     """
-    kept = None if steps is None else steps / f"{row['key']}.npz"
+    kept = None if steps is None else Path(steps) / f"{row['key']}.npz"
     if kept is not None and kept.is_file():
         return Run.load(kept)
     try:

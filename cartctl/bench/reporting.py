@@ -6,10 +6,12 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from cartctl import checks
 from cartctl.bench import pictures, writing
 from cartctl.bench.contents import contents, worst_cases
 from cartctl.bench.replays import FOLDER, write_replays
 from cartctl.bench.statistics import Row
+from cartctl.errors import ParameterError
 
 NAMES = ("report.html", "report.md", "profiles.png")
 
@@ -28,10 +30,12 @@ def report(
 ) -> Report:
     """Write ``folder/report.html``, ``report.md``, ``profiles.png`` and the pages of the worst ``replays`` runs.
 
-    rows: of :func:`cartctl.bench.results`. Raises FileError where the folder cannot be written.
+    rows: of :func:`cartctl.bench.results`. Raises FileError where the folder cannot be written, ParameterError.
     """
-    folder = Path(folder)
-    cases = [row for row, _ in worst_cases(rows)[: max(0, replays)]]
+    folder, replays = Path(folder), checks.whole("replays", replays, 0)
+    if not isinstance(rows, Sequence) or not rows or not all(isinstance(row, dict) and "key" in row for row in rows):
+        raise ParameterError(f"rows is {rows!r:.60}; expected the rows of cc.bench.results(folder), at least one")
+    cases = [row for row, _ in worst_cases(rows)[:replays]]
     links, troubles = write_replays(cases, folder / FOLDER, tell)
     sections = contents(rows, links)
     page, text, picture = (folder / name for name in NAMES)

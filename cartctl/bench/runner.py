@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from cartctl import checks
 from cartctl.bench import table
 from cartctl.bench.building import Stage
 from cartctl.bench.engines import Engine, cluster, here, processes
@@ -37,7 +38,7 @@ def grid(
     scenarios: str | Iterable[str | Scenario | ScenarioSet] = ("lectures",),
     solvers: str | Iterable[str] | Mapping[str, Solver | str] = ("all",),
     *,
-    levels: Sequence[str] | None = None,
+    levels: str | Sequence[str] | None = None,
     repeat: int = 1,
     seed: int = 0,
     keep_steps: bool = False,
@@ -47,7 +48,10 @@ def grid(
     for name, value, least in checked:
         if isinstance(value, bool) or not isinstance(value, int) or value < least:
             raise ParameterError(f"{name} is {value!r}; expected a whole number of at least {least}")
-    for level in levels or ():
+    if not isinstance(keep_steps, bool):
+        raise ParameterError(f"keep_steps is {keep_steps!r}; expected True or False")
+    levels = [levels] if isinstance(levels, str) else levels
+    for level in checks.listed("levels", levels or ()):
         if level not in known_levels():
             raise LevelNotFound(level, known_levels())
     return Grid(_scenarios(scenarios), methods(solvers), levels or None, repeat, seed, keep_steps)
@@ -58,7 +62,7 @@ def run(
     solvers: str | Iterable[str] | Mapping[str, Solver | str] = ("all",),
     *,
     out: str | Path = "out/bench",
-    levels: Sequence[str] | None = None,
+    levels: str | Sequence[str] | None = None,
     repeat: int = 1,
     seed: int = 0,
     workers: int = 1,
@@ -80,6 +84,10 @@ def run(
     jobs = grid(scenarios, solvers, levels=levels, repeat=repeat, seed=seed, keep_steps=keep_steps)
     if isinstance(workers, bool) or not isinstance(workers, int) or workers < 1:
         raise ParameterError(f"workers is {workers!r}; expected a whole number of at least 1")
+    if not isinstance(out, (str, Path)):
+        raise ParameterError(f"out is a {type(out).__name__}; expected the path of a folder")
+    if tell is not None and not callable(tell):
+        raise ParameterError(f"tell is a {type(tell).__name__}; expected a function of (done, total, words)")
     for group in _sets(scenarios):
         group.check()
     folder = Path(out)
@@ -115,7 +123,7 @@ def _sets(scenarios: Any) -> list[ScenarioSet]:
     """What is named, checked as files; objects are checked when they are made, and built here."""
     if isinstance(scenarios, (str, Scenario, ScenarioSet)):
         scenarios = [scenarios]
-    given = list(scenarios)
+    given = checks.listed("scenarios", scenarios)
     names = [each for each in given if isinstance(each, str)]
     for each in given:
         if isinstance(each, Scenario):
@@ -126,7 +134,9 @@ def _sets(scenarios: Any) -> list[ScenarioSet]:
 
 
 def _scenarios(scenarios: Any) -> list[tuple[str, Scenario]]:
-    given = [scenarios] if isinstance(scenarios, (str, Scenario, ScenarioSet)) else list(scenarios)
+    given = (
+        [scenarios] if isinstance(scenarios, (str, Scenario, ScenarioSet)) else checks.listed("scenarios", scenarios)
+    )
     chosen = [(group.name, scenario) for group in _sets(given) for scenario in group.scenarios]
     chosen += [("own", each) for each in given if isinstance(each, Scenario)]
     names = [scenario.name for _, scenario in chosen]

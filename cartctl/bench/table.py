@@ -9,7 +9,7 @@ from typing import Any
 
 from cartctl.bench.journal import NAME, current
 from cartctl.bench.schema import VERSION, arrow
-from cartctl.errors import ResultFileError
+from cartctl.errors import ParameterError, ResultFileError
 from cartctl.files import whole_file
 
 FILE = "results.parquet"
@@ -50,8 +50,11 @@ def rows_of(path: Path) -> Iterator[Row]:
             yield from batch.to_pylist()
 
 
-def results(place: Path) -> list[Row]:
-    """All runs of a folder (its journal is the truth) or of a Parquet file; raises ResultFileError."""
+def results(place: str | Path) -> list[Row]:
+    """All runs of a folder (its journal is the truth) or of a Parquet file; raises ResultFileError, ParameterError."""
+    if not isinstance(place, (str, Path)):
+        raise ParameterError(f"place is a {type(place).__name__}; expected the folder of a bench, or its {FILE}")
+    place = Path(place)
     if place.is_dir():
         if not (place / NAME).is_file() and not (place / FILE).is_file():
             raise ResultFileError(f"{place} holds no bench; expected {NAME} or {FILE}, as `cartctl bench run` writes")

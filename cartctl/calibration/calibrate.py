@@ -57,7 +57,7 @@ def calibrate(
     angles = chain.coordinates(q)
     data = read(kind, measurements, len(angles), anchor)
     checks.choice("loss", loss, LOSSES)
-    steps = int(checks.number("iterations", iterations, low=0))
+    steps = checks.whole("iterations", iterations, 0)
     agreement = checks.number("agreement", agreement, low=0.0)
     tolerance = checks.number("rank_tolerance", rank_tolerance, low=1e-13, high=0.1)
     names = chain.select(parameters)

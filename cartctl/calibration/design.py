@@ -68,7 +68,7 @@ def choose_configurations(
     """
     chain = as_chain(chain_or_robot, frame, base, tool)
     angles = chain.coordinates(candidates)
-    k = int(checks.number("count", count, low=1, high=len(angles)))
+    k = checks.whole("count", count, 1, len(angles))
     rng = np.random.default_rng(int(checks.number("seed", seed, low=0)))
     J = _information(chain, angles, parameters, kind, anchor, noise)
     if not J.shape[2]:

@@ -58,7 +58,7 @@ def cross_validate(
     q = checks.floats("q", q)
     angles = chain.coordinates(q)
     data = read(kind, measurements, len(angles), anchor)
-    count = int(checks.number("folds", folds, low=2))
+    count = checks.whole("folds", folds, 2)
     if count > len(angles):
         raise ParameterError(f"folds is {count}; expected at most {len(angles)}, the number of measurements")
     rng = np.random.default_rng(int(checks.number("seed", seed, low=0)))

@@ -80,6 +80,9 @@ def calibrate(
         parameters += " base"
     console = out()
     console.print(_plan(chain, table, measurements, parameters))
+    place = files.Files(
+        out_dir, chain.name, "calibrated"
+    )  # before the work: a folder that cannot be had is no surprise
     given = {"kind": table.kind, "anchor": table.anchor, "parameters": parameters, "noise": sigma, "loss": loss}
     with busy("calibrating"):
         result = cc.calibrate(chain, table.q, table.values, **given)  # type: ignore[arg-type]
@@ -89,7 +92,6 @@ def calibrate(
     console.print("", _errors(result, check), "")
     _remarks(result)
     console.print(_estimates(result), "")
-    place = files.Files(out_dir, chain.name, "calibrated")
     console.print(facts(_written(result, check, place)))
     console.print(facts([("load it by", _load(result.chain, place.at(".urdf")))]))
     if open_page:

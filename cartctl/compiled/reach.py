@@ -20,7 +20,7 @@ from cartctl.checks import FloatArray, IntArray
 from cartctl.compiled.best import improved
 from cartctl.compiled.motion_kernel import frame_poses
 from cartctl.compiled.reach_kernel import reach
-from cartctl.compiled.threads import thread_count, whole
+from cartctl.compiled.threads import thread_count
 from cartctl.compiled.tree import Tree, tree_of
 from cartctl.errors import ParameterError, ShapeError, TargetError
 from cartctl.model.limits import Limits
@@ -125,7 +125,9 @@ def inverse_kinematics(
     placed = tree.frame(robot.tool if frame is None else frame)
     goals = _targets(targets)
     first = _first(robot, q0, len(goals))
-    count = whole("candidates", (1 if objective is None else _CANDIDATES) if candidates is None else candidates, 1)
+    count = checks.whole(
+        "candidates", (1 if objective is None else _CANDIDATES) if candidates is None else candidates, 1
+    )
     if count > 1 and objective is None and not len(first):
         raise ParameterError(f"candidates is {count}; expected an objective or a q0 to choose the best by, or 1")
     if objective is not None:
@@ -133,14 +135,14 @@ def inverse_kinematics(
             raise ParameterError(f"objective is a {type(objective).__name__}; expected one such as cc.JointRange()")
         objective.check(robot)
     bounds = _bounds(robot, limits)
-    rng = np.random.default_rng(whole("seed", seed, 0))
+    rng = np.random.default_rng(checks.whole("seed", seed, 0))
     starts = _starts(robot, bounds, rng, _chain(tree, placed))
     table = np.empty((_STARTS, 12))
     frame_poses.compiled(tree.joints, placed, starts, table)
     span = max(float(np.sqrt(np.mean(np.var(table[:, 9:], axis=0)))), 1e-3)
     near = checks.number("position_tolerance", position_tolerance, low=0.0, strict=True)
     aligned = checks.number("orientation_tolerance", orientation_tolerance, low=0.0, strict=True)
-    job = _Job(tree, placed, bounds, starts, table, near, aligned, span, whole("restarts", restarts, 0))
+    job = _Job(tree, placed, bounds, starts, table, near, aligned, span, checks.whole("restarts", restarts, 0))
     found, said = _all(job, first, goals, count, robot.nq, thread_count(threads))
     if objective is not None:
         improved(robot, objective, robot.tool if frame is None else frame, bounds, goals, found, said, job.run)
@@ -201,12 +203,20 @@ def _targets(value: Any) -> FloatArray:
         value = value.homogeneous
     elif isinstance(value, (list, tuple)) and any(isinstance(pose, pin.SE3) for pose in value):
         value = [pose.homogeneous if isinstance(pose, pin.SE3) else pose for pose in value]
-    poses = checks.floats("targets", value)
+    try:
+        poses = checks.floats("targets", value)
+    except ShapeError as error:  # a path, a name, a list of unlike things: what is wanted here are poses
+        reason = str(error).partition("; ")[0]
+        raise TargetError(f"{reason}; expected a pose (pin.SE3 or 4x4), or (N, 4, 4) of them") from None
     if poses.shape == (4, 4):
         poses = poses[None]
     if poses.ndim != 3 or poses.shape[1:] != (4, 4):
         raise TargetError(f"targets has shape {poses.shape}; expected a pose (pin.SE3 or 4x4), or (N, 4, 4) of them")
-    checks.vector("targets", poses.ravel())  # refuses nan and inf
+    i, j, k = (
+        np.unravel_index(int(np.argmin(np.abs(poses) <= checks.LARGEST)), poses.shape) if poses.size else (0, 0, 0)
+    )
+    if poses.size and not abs(poses[i, j, k]) <= checks.LARGEST:
+        checks.number(f"targets[{i}, {j}, {k}]", poses[i, j, k], low=-checks.LARGEST, high=checks.LARGEST)
     R = poses[:, :3, :3]
     off = np.abs(np.swapaxes(R, 1, 2) @ R - np.eye(3)).max(axis=(1, 2))
     off = np.maximum(np.where(np.linalg.det(R) > 0.0, off, 1.0), np.abs(poses[:, 3] - _PATTERN).max(axis=1))

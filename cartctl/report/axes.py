@@ -38,8 +38,8 @@ def logarithmic(axes: Any, top: float = np.inf) -> None:
         return
     top = min(positive.max(), top)
     low = max(np.percentile(positive, 1), top / 10.0**DECADES)  # the zero from which a run starts has no place here
+    axes.set_ylim(low / 1.6, top * 2.5)  # first: a curve of one value has no range of its own that a scale could take
     axes.set_yscale("log", nonpositive="mask")
-    axes.set_ylim(low / 1.6, top * 2.5)
     if top / low < 30:  # within a decade or so, powers of ten alone would say little
         axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
     axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
