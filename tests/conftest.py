@@ -1,8 +1,9 @@
-"""Hypothesis profiles: ``ci`` is reproducible and quick, ``deep`` (HYPOTHESIS_PROFILE=deep) hunts."""
+"""Hypothesis profiles: ``ci`` is reproducible and quick, ``deep`` (HYPOTHESIS_PROFILE=deep) hunts; Ctrl-C is heard."""
 
 from __future__ import annotations
 
 import os
+import signal
 
 from hypothesis import HealthCheck, settings
 
@@ -11,3 +12,7 @@ settings.register_profile(
 )
 settings.register_profile("deep", max_examples=1000, deadline=None)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "ci"))
+
+# Started in the background of a script, a process ignores Ctrl-C, and so would those that tests start and interrupt.
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)

@@ -6,7 +6,7 @@ import numpy as np
 
 from cartctl.algebra import proofs as check
 from cartctl.kernels import part
-from cartctl.solvers.exact.call import Arrays
+from cartctl.solvers.exact.disguise import Given
 from cartctl.solvers.exact.kinds import CONTRADICTORY, FITTED, INTERVAL, SCALED, STUCK
 from cartctl.solvers.exact.lexicographic import lexicographic
 
@@ -30,7 +30,7 @@ def demoted(m, hard):
     sizes, fits, natural = np.empty(p + 1, np.int64), np.empty(p + 1, np.int64), np.zeros(p + 1)
     sizes[0], fits[0] = hard, INTERVAL
     sizes[1:], fits[1:], natural[1:] = m.sizes, m.fits, m.natural
-    return Arrays(m.A, m.b, m.d, sizes, fits, natural, m.lower, m.upper, m.C, m.c_lower, m.c_upper, m.reference)
+    return Given(m.A, m.b, m.d, sizes, fits, natural, m.lower, m.upper, m.C, m.c_lower, m.c_upper, m.reference)
 
 
 @part

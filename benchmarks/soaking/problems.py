@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cartctl.kernels import part
-from cartctl.solvers.exact.call import Arrays
+from cartctl.solvers.exact.disguise import Given
 from cartctl.solvers.exact.kinds import FITTED, INTERVAL, SCALED
 from soaking.bounds import box, intervals
 from soaking.draws import between, chance, new_state, normal, power, share, whole
@@ -21,7 +21,7 @@ from soaking.matrices import fill, pick_kind
 class Made(NamedTuple):
     """The engine's arguments, and random codes to start from, or none."""
 
-    arrays: Arrays
+    arrays: Given
     guess: NDArray[np.int64]
 
 
@@ -72,7 +72,7 @@ def make(seed, index):
             guess[i] = whole(state, 0, 2 * (n + hard + soft) - 1)
     natural = np.zeros(p)
     drift = d if np.abs(d).sum() > 0.0 else np.empty(0)
-    arrays = Arrays(A, b, drift, sizes, fits, natural, lower, upper, C, c_lower, c_upper, reference)
+    arrays = Given(A, b, drift, sizes, fits, natural, lower, upper, C, c_lower, c_upper, reference)
     return Made(arrays, guess), n, grey
 
 

@@ -19,6 +19,7 @@ from cartctl.algebra.proofs import check_proofs
 from cartctl.algebra.solution import Solution, Status
 from cartctl.algebra.svd import scale
 from cartctl.checks import FloatArray
+from cartctl.solvers.exact.disguise import Given
 from cartctl.solvers.exact.kinds import CONTRADICTORY, EXTREME, FITTED, INTERVAL, SCALED
 from cartctl.solvers.exact.lexicographic import lexicographic
 
@@ -28,23 +29,6 @@ _CLAIMS = {SCALED: "scale", FITTED: "least squares", INTERVAL: "least squares"}
 _EMPTY = np.zeros(0)
 _NO_ROWS = np.zeros((0, 0))
 _NO_GUESS = np.zeros(1, dtype=np.int64)
-
-
-class Arrays(NamedTuple):
-    """The engine's arguments up to the reference, in its order."""
-
-    A: FloatArray
-    b: FloatArray
-    d: FloatArray
-    sizes: NDArray[np.int64]
-    fits: NDArray[np.int64]
-    natural: FloatArray
-    lower: FloatArray
-    upper: FloatArray
-    C: FloatArray
-    c_lower: FloatArray
-    c_upper: FloatArray
-    reference: FloatArray
 
 
 class Outcome(NamedTuple):
@@ -66,7 +50,7 @@ def answer(problem: Problem, fitted: bool, start: Solution | None) -> Outcome:
     return found._replace(u=problem.clip(white.back(found.u)))
 
 
-def _yielding(arrays: Arrays, problem: Problem, guess: NDArray[np.int64]) -> Outcome:
+def _yielding(arrays: Given, problem: Problem, guess: NDArray[np.int64]) -> Outcome:
     """The answer; where the box forbids the constraint rows, they are missed by as little as it allows."""
     found = _run(arrays, problem.n, guess, _NO_ROWS)
     if not found.flags & CONTRADICTORY:
@@ -75,7 +59,7 @@ def _yielding(arrays: Arrays, problem: Problem, guess: NDArray[np.int64]) -> Out
     return found._replace(scales=found.scales[1:], flags=found.flags | CONTRADICTORY)
 
 
-def _demoted(arrays: Arrays, problem: Problem) -> Arrays:
+def _demoted(arrays: Given, problem: Problem) -> Given:
     """The constraint rows as a level of their own, above all others."""
     assert problem.constraints is not None
     return arrays._replace(
@@ -85,7 +69,7 @@ def _demoted(arrays: Arrays, problem: Problem) -> Arrays:
     )
 
 
-def _run(arrays: Arrays, n: int, guess: NDArray[np.int64], proofs: FloatArray) -> Outcome:
+def _run(arrays: Given, n: int, guess: NDArray[np.int64], proofs: FloatArray) -> Outcome:
     u, scales = np.empty(n), np.empty(arrays.sizes.shape[0])
     active = np.empty(n + 2, dtype=np.int64)
     try:
@@ -99,7 +83,7 @@ def _run(arrays: Arrays, n: int, guess: NDArray[np.int64], proofs: FloatArray) -
     return Outcome(u, scales, flags, active)
 
 
-def balanced(arrays: Arrays) -> Arrays:
+def balanced(arrays: Given) -> Given:
     """The same problem with every equation, and every row of C, divided by its largest entry."""
     A, b, d, natural = (np.array(x) for x in (arrays.A, arrays.b, arrays.d, arrays.natural))
     row = 0
@@ -122,7 +106,7 @@ def balanced(arrays: Arrays) -> Arrays:
         )
 
 
-def arrays_of(problem: Problem, fitted: bool) -> Arrays:
+def arrays_of(problem: Problem, fitted: bool) -> Given:
     """The engine's arguments, metric aside."""
     equations = problem.equations
     lower = _EMPTY if problem.lower is None else problem.lower
@@ -134,7 +118,7 @@ def arrays_of(problem: Problem, fitted: bool) -> Arrays:
         sizes, fits = _levels((e.A.shape[0],), (FITTED if fitted else _KINDS[e.fit],))
         natural = _sizes((e.size,))
         d = _EMPTY if e.drift is None else e.drift
-        return Arrays(e.A, e.b, d, sizes, fits, natural, lower, upper, C, c_lower, c_upper, u0)
+        return Given(e.A, e.b, d, sizes, fits, natural, lower, upper, C, c_lower, c_upper, u0)
     A: list[FloatArray] = []
     b: list[FloatArray] = []
     drifts: list[FloatArray | None] = []
@@ -162,7 +146,7 @@ def arrays_of(problem: Problem, fitted: bool) -> Arrays:
     if drifting:
         d = np.concatenate([np.zeros(len(y)) if x is None else x for x, y in zip(drifts, b, strict=True)])
     rows, right = (np.concatenate(A), np.concatenate(b)) if A else (_NO_ROWS, _EMPTY)
-    return Arrays(rows, right, d, sizes, fits, _sizes(tuple(nature)), lower, upper, C, c_lower, c_upper, u0)
+    return Given(rows, right, d, sizes, fits, _sizes(tuple(nature)), lower, upper, C, c_lower, c_upper, u0)
 
 
 def _with_soft_rows(
@@ -190,7 +174,7 @@ def _sizes(natural: tuple[float, ...]) -> FloatArray:
     return np.array(natural)
 
 
-def whitened(arrays: Arrays, problem: Problem, white: Whitening) -> Arrays:
+def whitened(arrays: Given, problem: Problem, white: Whitening) -> Given:
     """The same problem in y = L^T u."""
     n = problem.n
     natural = np.array(
@@ -249,7 +233,7 @@ def certificate(solution: Solution, fitted: bool) -> Certificate:
     )
 
 
-def _proofs(arrays: Arrays, problem: Problem, proofs: FloatArray) -> FloatArray:
+def _proofs(arrays: Given, problem: Problem, proofs: FloatArray) -> FloatArray:
     """Multipliers of every level, (p + 1, M + n + r), for the problem's own rows and bounds."""
     n, M, W = problem.n, arrays.A.shape[0], problem.metric
     if W is not None and W.ndim == 2:
