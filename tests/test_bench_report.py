@@ -14,7 +14,7 @@ from cartctl.bench import pictures
 from cartctl.bench.contents import LIMITATIONS, contents, worst_cases
 from cartctl.bench.statistics import scores
 from cartctl.bench.table import Row, results
-from cartctl.errors import ParameterError
+from cartctl.errors import BenchError, ParameterError
 from tests.bench_scenarios import short
 
 ODD = 'odd <b> & "name" | _x_'
@@ -122,6 +122,8 @@ def test_a_replay_is_the_run_itself(rows: list[Row]) -> None:
         if row["outcome"] == "done":
             run = bench.replay(row)
             assert run.metrics().tasks[0].rms_m == row["rms_m"] and len(run) == row["steps"]
+    with pytest.raises(BenchError, match=r"the row has no 'solver'; expected a row of cc\.bench\.results"):
+        bench.replay({"key": "a"})
 
 
 def test_nobody_solved_is_said(rows: list[Row]) -> None:

@@ -579,6 +579,8 @@ def test_misuse_of_calibrate_is_named(options, error, words):
         (lambda: cal.cross_validate(puma(), Q, P, kind="position", folds=1), ParameterError, "folds"),
         (lambda: cal.cross_validate(puma(), Q, P, kind="position", folds=2.5), ParameterError, "folds is 2.5"),
         (lambda: cal.choose_configurations(puma(), Q, 2.5), ParameterError, "count is 2.5"),
+        (lambda: cal.cross_validate(puma(), Q, P, kind="position", folds=2, seed=2.5), ParameterError, "seed is 2.5"),
+        (lambda: cal.choose_configurations(puma(), Q, 2, seed=-1), ParameterError, "seed is -1"),
         (lambda: cc.calibrate(puma(), Q, P, iterations=2.5), ParameterError, "iterations is 2.5"),
         (lambda: cal.aligned(puma(), Q, P, kind="position"), cc.CartctlError, "lie on a line"),
         (lambda: cal.aligned(puma(), Q, np.ones(4), kind="distance"), cc.CartctlError, "distance"),

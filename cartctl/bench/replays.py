@@ -18,6 +18,7 @@ from cartctl.errors import BenchError, CartctlError
 from cartctl.motion.run import Run
 
 FOLDER = "replays"
+_NEEDED = ("key", "solver", "parameters", "scenario_json", "set", "level", "repeat", "seed")
 
 
 def replay(row: Row, steps: str | Path | None = None) -> Run:
@@ -25,6 +26,9 @@ def replay(row: Row, steps: str | Path | None = None) -> Run:
 
     Raises where the method is none of the registry with its default parameters, which cannot be made from a row.
     """
+    missing = [name for name in _NEEDED if name not in row]
+    if missing:
+        raise BenchError(f"the row has no {missing[0]!r}; expected a row of cc.bench.results()")
     kept = None if steps is None else Path(steps) / f"{row['key']}.npz"
     if kept is not None and kept.is_file():
         return Run.load(kept)

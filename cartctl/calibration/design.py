@@ -69,7 +69,7 @@ def choose_configurations(
     chain = as_chain(chain_or_robot, frame, base, tool)
     angles = chain.coordinates(candidates)
     k = checks.whole("count", count, 1, len(angles))
-    rng = np.random.default_rng(int(checks.number("seed", seed, low=0)))
+    rng = np.random.default_rng(checks.whole("seed", seed, least=0))
     J = _information(chain, angles, parameters, kind, anchor, noise)
     if not J.shape[2]:
         raise ParameterError("the candidates see none of the parameters; measure another kind, or choose others")

@@ -61,7 +61,7 @@ def cross_validate(
     count = checks.whole("folds", folds, 2)
     if count > len(angles):
         raise ParameterError(f"folds is {count}; expected at most {len(angles)}, the number of measurements")
-    rng = np.random.default_rng(int(checks.number("seed", seed, low=0)))
+    rng = np.random.default_rng(checks.whole("seed", seed, least=0))
     fold = rng.permutation(np.arange(len(angles)) % count)
     residuals, results = np.empty((len(angles), data.rows)), list[Calibration]()
     for k in range(count):
