@@ -52,7 +52,11 @@ def test_every_step_is_finite_and_grades_itself_honestly(
     command = controller.step(robot.random_configuration(rng), rng.normal(size=robot.nv), float(rng.normal()))
     solution = command.solution
     assert command.velocity.shape == (robot.nv,) and np.isfinite(command.velocity).all()
-    assert np.isfinite(solution.residuals).all() and (solution.scales == 1.0).all()
+    assert np.isfinite(solution.residuals).all()
+    if controller.solver.scales:  # contradicting tasks are slowed down, or asked again in another way
+        assert not ((solution.scales < 0.0) | (solution.scales > 1.0)).any()  # nan: left out
+        return
+    assert (solution.scales == 1.0).all()
     for equation, reference, task in zip(solution.problem.equations, command.references, controller.tasks, strict=True):
         np.testing.assert_allclose(equation.b, task.gain * reference.error, atol=1e-12)
     if solution.status is cc.Status.OPTIMAL:
