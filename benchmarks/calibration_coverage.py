@@ -10,11 +10,10 @@ them; "as planted": projected onto these directions, which is the same to first 
 
 from __future__ import annotations
 
-import argparse
 from pathlib import Path
 
 import numpy as np
-from harness import save_rows, setting, show
+from harness import one_table
 from scipy.spatial.transform import Rotation
 
 import cartctl as cc
@@ -81,13 +80,7 @@ def rows() -> list[dict[str, str]]:
 
 def main() -> None:
     """Measure, print and, if asked, save."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--save", action="store_true", help=f"write {RESULTS.name}")
-    save = parser.parse_args().save
-    found = rows()
-    show("Truth in the 95 % ellipsoid", found)
-    if save:
-        save_rows(RESULTS, found, setting())
+    one_table(__doc__, RESULTS, "Truth in the 95 % ellipsoid", rows)
 
 
 if __name__ == "__main__":

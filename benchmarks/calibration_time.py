@@ -9,12 +9,11 @@ QR factorisation of the stacked regressor of the same size: what a single least-
 
 from __future__ import annotations
 
-import argparse
 from pathlib import Path
 from time import perf_counter
 
 import numpy as np
-from harness import save_rows, setting, show
+from harness import one_table
 from scipy.spatial.transform import Rotation
 
 import cartctl as cc
@@ -86,13 +85,7 @@ def rows() -> list[dict[str, str]]:
 
 def main() -> None:
     """Measure, print and, if asked, save."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--save", action="store_true", help=f"write {RESULTS.name}")
-    save = parser.parse_args().save
-    found = rows()
-    show("Calibration of the Panda", found)
-    if save:
-        save_rows(RESULTS, found, setting())
+    one_table(__doc__, RESULTS, "Calibration of the Panda", rows)
 
 
 if __name__ == "__main__":

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import argparse
 import csv
 import os
 import platform
+import statistics
 from collections.abc import Callable
 from datetime import date
 from importlib.metadata import version
 from pathlib import Path
 from time import perf_counter_ns
 
+import numpy as np
 from rich.console import Console
 from rich.table import Table
 
@@ -36,6 +39,19 @@ def interleaved(
                 function()
             times[name].append((perf_counter_ns() - start) / calls / 1e3)
     return times
+
+
+def ratios(times: dict[str, list[float]], reference: str) -> list[dict[str, str]]:
+    """One row a function: median and 90th percentile in us, median ratio to the reference of the same round."""
+    return [
+        {
+            "what": name,
+            "median_us": f"{statistics.median(values):.2f}",
+            "p90_us": f"{np.percentile(values, 90):.2f}",
+            "ratio": f"{statistics.median(v / r for v, r in zip(values, times[reference], strict=True)):.1f}",
+        }
+        for name, values in times.items()
+    ]
 
 
 def setting() -> dict[str, str]:
@@ -66,3 +82,14 @@ def save_rows(path: Path, rows: list[dict[str, str]], extra: dict[str, str]) -> 
         writer.writeheader()
         writer.writerows({**row, **extra} for row in rows)
     Console().print(f"written: {path.name}")
+
+
+def one_table(words: str, results: Path, title: str, measured: Callable[[], list[dict[str, str]]]) -> None:
+    """The command line of a script that measures one table: print it and, with --save, write it."""
+    parser = argparse.ArgumentParser(description=words.splitlines()[0])
+    parser.add_argument("--save", action="store_true", help=f"write {results.name}")
+    save = parser.parse_args().save
+    found = measured()
+    show(title, found)
+    if save:
+        save_rows(results, found, setting())

@@ -11,7 +11,6 @@ shares neither shapes nor rows with the controller.
 from __future__ import annotations
 
 import argparse
-import statistics
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -19,7 +18,7 @@ from pathlib import Path
 import coal
 import numpy as np
 import pinocchio as pin
-from harness import SHORT, interleaved, save_rows, setting, show
+from harness import SHORT, interleaved, ratios, save_rows, setting, show
 
 import cartctl as cc
 from cartctl.constraints import Box
@@ -76,17 +75,7 @@ def candidates() -> dict[str, Callable[[], object]]:
 
 def timed(save: bool) -> None:
     """The table of times."""
-    times = interleaved(candidates(), **SHORT)
-    reference = times[REFERENCE]
-    rows = [
-        {
-            "what": name,
-            "median_us": f"{statistics.median(values):.1f}",
-            "p90_us": f"{np.percentile(values, 90):.1f}",
-            "ratio": f"{statistics.median(v / r for v, r in zip(values, reference, strict=True)):.1f}",
-        }
-        for name, values in times.items()
-    ]
+    rows = ratios(interleaved(candidates(), **SHORT), REFERENCE)
     show(f"Obstacles on the Panda; ratio to {REFERENCE}", rows)
     if save:
         save_rows(RESULTS / "obstacles_time.csv", rows, setting())

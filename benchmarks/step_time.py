@@ -10,13 +10,12 @@ is the median of the rounds' ratios against Pinocchio's computeFrameJacobian.
 from __future__ import annotations
 
 import argparse
-import statistics
 from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
-from harness import interleaved, save_rows, setting, show
+from harness import interleaved, ratios, save_rows, setting, show
 
 import cartctl as cc
 
@@ -51,20 +50,6 @@ def candidates() -> dict[str, Callable[[], object]]:
     return found
 
 
-def rows(times: dict[str, list[float]]) -> list[dict[str, str]]:
-    """One row a candidate."""
-    reference = times[REFERENCE]
-    return [
-        {
-            "what": name,
-            "median_us": f"{statistics.median(values):.2f}",
-            "p90_us": f"{np.percentile(values, 90):.2f}",
-            "ratio": f"{statistics.median(v / r for v, r in zip(values, reference, strict=True)):.1f}",
-        }
-        for name, values in times.items()
-    ]
-
-
 def write_table(found: list[dict[str, str]], where: dict[str, str]) -> None:
     """Put the figures into the README, between its markers."""
     lines = ["| what | median us | x computeFrameJacobian |", "|---|---|---|"]
@@ -80,7 +65,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--save", action="store_true", help=f"write {RESULTS.name} and the README's table")
     save = parser.parse_args().save
-    found = rows(interleaved(candidates()))
+    found = ratios(interleaved(candidates()), REFERENCE)
     show(f"One step on the Panda, 7 dof, 6D pose; ratio to {REFERENCE}", found)
     if save:
         save_rows(RESULTS, found, setting())

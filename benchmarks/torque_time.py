@@ -9,14 +9,13 @@ bounds as rows at the acceleration level.
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
-from harness import SHORT, interleaved, save_rows, setting, show
-from step_time import REFERENCE, rows
+from harness import SHORT, interleaved, one_table, ratios
+from step_time import REFERENCE
 
 import cartctl as cc
 
@@ -54,15 +53,19 @@ def candidates() -> dict[str, Callable[[], object]]:
     return found
 
 
+def measured() -> list[dict[str, str]]:
+    """The table."""
+    return ratios(interleaved(candidates(), **SHORT), REFERENCE)
+
+
 def main() -> None:
     """Measure, print and, if asked, save."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--save", action="store_true", help=f"write {RESULTS.name}")
-    save = parser.parse_args().save
-    found = rows(interleaved(candidates(), **SHORT))
-    show(f"One step on the Panda, 7 dof, 6D pose; ratio to {REFERENCE}", found)
-    if save:
-        save_rows(RESULTS, found, setting())
+    one_table(
+        __doc__,
+        RESULTS,
+        f"One step on the Panda, 7 dof, 6D pose; ratio to {REFERENCE}",
+        lambda: ratios(interleaved(candidates(), **SHORT), REFERENCE),
+    )
 
 
 if __name__ == "__main__":

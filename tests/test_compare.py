@@ -197,6 +197,8 @@ def test_markdown_is_a_table_whatever_the_names(runs: dict[str, cc.Run], tmp_pat
 
 
 def test_lines_are_the_numbers_of_each_run(compared: Comparison) -> None:
+    with pytest.raises(ParameterError, match="file type"):
+        compared.plot("compared.doc")
     drawn = compared.plot()
     for name, run in compared.runs.items():
         robot = run.robot

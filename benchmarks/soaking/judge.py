@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from cartctl.algebra import proofs as check
 from cartctl.kernels import part
 from cartctl.solvers.exact.disguise import Given
 from cartctl.solvers.exact.kinds import CONTRADICTORY, FITTED, INTERVAL, SCALED, STUCK
-from cartctl.solvers.exact.lexicographic import lexicographic
+from cartctl.solvers.exact.lexicographic import lexicographic, residuals_of
 
-_solve, _check = part(lexicographic.function), part(check.check_proofs.function)
+_solve = part(lexicographic.function)
 
 # What is counted.
 LEVELS_FULL, LEVELS_SCALED, LEVELS_SKIPPED, LEVELS_FITTED, LEVELS_INTERVAL, CONTRADICTIONS, COARSE, GREY, AT = range(9)
@@ -101,15 +100,7 @@ def _plausible(m, u, scales, counts):
 @part
 def _proven(m, u, scales, proofs, worst, counts):
     """What the multipliers leave open."""
-    force, reach = u.copy(), np.abs(u).max()
-    if m.reference.shape[0] > 0:
-        force -= m.reference
-        reach = (np.abs(u) + np.abs(m.reference)).max()
-    residuals = np.zeros((proofs.shape[0], 3))
-    _check(
-        m.A, m.b, m.d, m.sizes, m.fits, m.natural, m.lower, m.upper, m.C, m.c_lower, m.c_upper, force, reach, reach,
-        u, scales, proofs, residuals,
-    )  # fmt: skip
+    residuals = residuals_of(m, u, scales, proofs)
     failure, size = FINE, 0.0
     for k in range(residuals.shape[0]):
         for j in range(3):

@@ -11,8 +11,8 @@ import cartctl as cc
 from cartctl.cli.console import progress, say
 from cartctl.cli.course import Course
 from cartctl.cli.method import make_solver, spends_redundancy
-from cartctl.cli.purposes import aimed, in_words
 from cartctl.errors import ProblemError, UnsupportedProblem
+from cartctl.objectives.named import aimed, in_words
 from cartctl.report import Comparison
 
 

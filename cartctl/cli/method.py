@@ -8,10 +8,10 @@ from typing import Any, NamedTuple
 
 from cartctl import checks
 from cartctl.cli.choices import OBJECTIVES, choice
-from cartctl.cli.purposes import KNOWN, in_words
 from cartctl.errors import ParameterError, UnsupportedProblem
 from cartctl.levels import get_level
 from cartctl.objectives import Objective
+from cartctl.objectives.named import KNOWN, in_words
 from cartctl.solvers import Solver, solver_class, solvers
 
 

@@ -51,7 +51,7 @@ def track(
     with busy(f"loading {robot}"):
         from cartctl.cli import files, method, scores
         from cartctl.cli.course import Course, Pace, Place, Way
-        from cartctl.cli.purposes import aimed
+        from cartctl.objectives.named import aimed
 
         how = method.make_solver(solver, damping)
         purpose = method.make_purpose(how, objective, objective_gain)

@@ -8,10 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from cartctl import checks
 from cartctl.checks import FloatArray
 from cartctl.errors import RunFileError
-from cartctl.files import whole_file
 from cartctl.model.robot import Robot
 from cartctl.motion.energy import EnergyBooks
 
@@ -127,14 +125,11 @@ class Run:
 
     def plot(self, path: str | os.PathLike[str] | None = None) -> Figure:
         """A figure of errors, joints, rates, torques, singular values and step time; written to ``path`` if given."""
-        from cartctl.report import plot_run
+        from cartctl.report import plot_run, save_figure
 
         figure = plot_run(self)
         if path is not None:
-            kind = Path(path).suffix[1:].lower() or "png"
-            checks.choice("the plot's file type", kind, sorted(figure.canvas.get_supported_filetypes()))
-            with whole_file(path) as part:
-                figure.savefig(part, dpi=150, format=kind)
+            save_figure(figure, path)
         return figure
 
     def html(self, path: str | os.PathLike[str]) -> Path:

@@ -15,8 +15,17 @@ if TYPE_CHECKING:
     from cartctl.report.html import write_html as write_html
     from cartctl.report.planning import plot_plan as plot_plan
     from cartctl.report.plots import plot_run as plot_run
+    from cartctl.report.saving import save_figure as save_figure
 
-__all__ = ["Comparison", "plot_calibration", "plot_plan", "plot_run", "write_calibration_html", "write_html"]
+__all__ = [
+    "Comparison",
+    "plot_calibration",
+    "plot_plan",
+    "plot_run",
+    "save_figure",
+    "write_calibration_html",
+    "write_html",
+]
 
 _HOMES = {
     "Comparison": "cartctl.report.comparison",
@@ -25,6 +34,7 @@ _HOMES = {
     "write_html": "cartctl.report.html",
     "plot_plan": "cartctl.report.planning",
     "plot_run": "cartctl.report.plots",
+    "save_figure": "cartctl.report.saving",
 }
 
 

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from cartctl.errors import ParameterError
-from cartctl.files import whole_file
 from cartctl.objectives import JointRange, Objective
 from cartctl.report.figures import Figure, figures
 from cartctl.report.numbers import number
@@ -108,11 +107,11 @@ class Comparison:
     def plot(self, path: str | os.PathLike[str] | None = None) -> Plot:
         """A figure with the runs laid over each other; written to ``path`` if given."""
         from cartctl.report.overlay import plot_comparison
+        from cartctl.report.saving import save_figure
 
         figure = plot_comparison(self)
         if path is not None:
-            with whole_file(path) as part:
-                figure.savefig(part, dpi=150, format=Path(path).suffix[1:] or "png")
+            save_figure(figure, path)
         return figure
 
     def html(self, path: str | os.PathLike[str]) -> Path:

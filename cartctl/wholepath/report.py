@@ -6,11 +6,8 @@ import os
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from enum import Enum
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from cartctl import checks
-from cartctl.files import whole_file
 from cartctl.wholepath.between import Bound
 from cartctl.wholepath.local import LocalMethod
 from cartctl.wholepath.sqp import Iterate
@@ -94,14 +91,11 @@ class PlanReport:
 
     def plot(self, path: str | os.PathLike[str] | None = None) -> Figure:
         """A figure of the convergence, the costs and the drifts; written to ``path`` if given."""
-        from cartctl.report import plot_plan
+        from cartctl.report import plot_plan, save_figure
 
         figure = plot_plan(self)
         if path is not None:
-            kind = Path(path).suffix[1:].lower() or "png"
-            checks.choice("the plot's file type", kind, sorted(figure.canvas.get_supported_filetypes()))
-            with whole_file(path) as part:
-                figure.savefig(part, dpi=150, format=kind)
+            save_figure(figure, path)
         return figure
 
     def summary(self) -> dict[str, Any]:

@@ -101,6 +101,17 @@ def _sure(
 @part
 def _judged(m: Given, u: FloatArray, scales: FloatArray, proofs: FloatArray) -> float:
     """The worst residual of an answer's own multipliers."""
+    residuals, worst = residuals_of(m, u, scales, proofs), 0.0
+    for k in range(residuals.shape[0]):
+        for j in range(3):
+            if not residuals[k, j] <= worst:
+                worst = residuals[k, j] if residuals[k, j] == residuals[k, j] else np.inf
+    return worst
+
+
+@part
+def residuals_of(m: Given, u: FloatArray, scales: FloatArray, proofs: FloatArray) -> FloatArray:
+    """Primal, dual and gap of every level (p + 1, 3) by multipliers, which are completed in place."""
     force, reach = u.copy(), np.abs(u).max()
     if m.reference.shape[0] > 0:
         force -= m.reference
@@ -110,9 +121,4 @@ def _judged(m: Given, u: FloatArray, scales: FloatArray, proofs: FloatArray) -> 
         m.A, m.b, m.d, m.sizes, m.fits, m.natural, m.lower, m.upper, m.C, m.c_lower, m.c_upper, force, reach, reach,
         u, scales, proofs, residuals,
     )  # fmt: skip
-    worst = 0.0
-    for k in range(residuals.shape[0]):
-        for j in range(3):
-            if not residuals[k, j] <= worst:
-                worst = residuals[k, j] if residuals[k, j] == residuals[k, j] else np.inf
-    return worst
+    return residuals
