@@ -200,6 +200,15 @@ class Approach:
         """What is wanted of the null space, no faster than the tasks leave to it."""
         return self._above.slowed(u)
 
+    def bends(self, tasks: Iterable[Task]) -> list[FloatArray | None]:
+        """How the arm was bent when it was last clear, by task: the motion inwards (nv,), None where it never was."""
+        return [self._bent.get(id(task)) for task in tasks]
+
+    def resume(self, tasks: Iterable[Task], bends: Iterable[FloatArray | None]) -> None:
+        """Go on from what another one's :meth:`bends` said."""
+        pairs = zip(tasks, bends, strict=True)
+        self._bent = {id(task): motion for task, motion in pairs if motion is not None}
+
     def reset(self) -> None:
         """Forget how the arm was bent."""
         self._bent.clear()

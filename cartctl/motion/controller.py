@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import warnings
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -13,8 +13,16 @@ from cartctl import checks
 from cartctl.algebra.problem import Problem
 from cartctl.algebra.solution import Solution, Status
 from cartctl.checks import LARGEST, FloatArray, is_moderate
+from cartctl.compiled.fused_step import FusedStep, Memory
 from cartctl.constraints import Constraint
-from cartctl.errors import CartctlWarning, NoTasksError, ParameterError, ProblemError, UnsupportedProblem
+from cartctl.errors import (
+    CartctlWarning,
+    NoTasksError,
+    ParameterError,
+    ProblemError,
+    UnsupportedJoint,
+    UnsupportedProblem,
+)
 from cartctl.levels import Command, Level, Secondary, get_level
 from cartctl.levels.base import Confines
 from cartctl.levels.metrics import as_state_metric
@@ -22,6 +30,7 @@ from cartctl.levels.midway import ROUNDS, Midway
 from cartctl.levels.singularity import Guard
 from cartctl.levels.torque import TorqueLevel
 from cartctl.levels.torque_fused import FusedTorque, fuses
+from cartctl.levels.velocity import VelocityLevel
 from cartctl.levels.yielding import missed
 from cartctl.model.limits import Limits
 from cartctl.model.robot import Robot
@@ -60,6 +69,8 @@ class Controller:
     Raises NoTasksError, ProblemError, TimeStepError, FrameNotFound, JointNotFound, SolverNotFound, LevelNotFound,
     UnsupportedProblem, UnderactuatedRobot, MetricError, ParameterError, NonFiniteError.
     """
+
+    _fuses: ClassVar[bool] = True  # whether a step may be taken at one stroke; tests compare it with the general way
 
     def __init__(
         self,
@@ -110,15 +121,18 @@ class Controller:
         self._waiting = [task for task, waits in zip(self.tasks, clocked, strict=True) if waits]
         self._confining = self._confined_by(self._limits)
         self._last: Solution | None = None
-        self.step_times: list[float] = []  # each task's own time at the last step
+        self._step_times: list[float] = []
         self._state = State(robot)
         self._zeros = np.zeros(robot.nv)
         self._zeros.flags.writeable = False
         self._anchors: list[Any] | None = None
         self._started: float | None = None
+        self._stroke = self._at_one_stroke()
+        self._ahead = False  # whether what lasts is with the stroke, and what is here is out of date
 
     def reset(self) -> None:
         """Forget all that lasts from step to step, as before the first one."""
+        self._ahead = False
         self._anchors = None
         self._started = None
         self._last = None
@@ -134,8 +148,10 @@ class Controller:
     @limits.setter
     def limits(self, limits: Limits | None) -> None:
         limits = usable_limits(limits, self.robot, self.solver, self.level)
-        self._confining = self._confined_by(limits)
-        self._limits = limits
+        confining = self._confined_by(limits)
+        self._fall_back()
+        self._confining, self._limits = confining, limits
+        self._stroke = self._at_one_stroke()
 
     def compiled_limits(self) -> tuple[FloatArray | None, FloatArray | None, list[bool]]:
         """What a compiled loop needs to know of the limits: (11, nv), (3, nv) of the approach, and whose paths wait.
@@ -158,9 +174,52 @@ class Controller:
             return None
         return FusedTorque(self.level, self.solver, self.tasks, self.robot.nv)
 
+    def _at_one_stroke(self) -> FusedStep | None:
+        """The whole step in compiled code, at the velocity level, where there is such a way for everything given."""
+        plain = self.metric is None or (isinstance(self.metric, str) and self.metric == "identity")
+        if not (self._fuses and type(self.level) is VelocityLevel and plain):
+            return None
+        if self.objective is not None or self._guard.policy is not None:
+            return None
+        try:
+            packed, braking, waits = self.compiled_limits()
+            return FusedStep(self.robot, self.tasks, self.solver, packed, braking, waits, self.dt)
+        except (UnsupportedProblem, UnsupportedJoint):
+            return None
+
+    def _struck(self, stroke: FusedStep, q: FloatArray, v: FloatArray | None, t: float) -> Command | None:
+        """A step by that way, from where the general one has come to."""
+        if not self._ahead:
+            kept = Memory(self._anchors, [], *self._clocks.kept, self._confining.bends(self.tasks))
+            stroke.resume(kept)
+            self._ahead = True
+        command = stroke.step(q, v, t)
+        if command is not None and self._started is None:
+            self._started = t
+        return command
+
+    def _fall_back(self) -> None:
+        """Take what lasts back from the stroke."""
+        if not self._ahead or self._stroke is None:
+            return
+        memory = self._stroke.memory
+        self._ahead = False
+        self._anchors, self._last = memory.anchors, None
+        if memory.anchors is not None:
+            self._step_times = memory.times
+        self._clocks.resume(memory.delays, memory.shares, memory.last)
+        self._confining.resume(self.tasks, memory.bent)
+
+    @property
+    def step_times(self) -> list[float]:
+        """Each task's own time at the last step."""
+        if self._ahead and self._stroke is not None and self._started is not None:
+            return self._stroke.step_times
+        return self._step_times
+
     def times(self, t: float) -> list[float]:
         """Each task's own time when everybody else's is t: later by what its path has waited."""
-        return self._clocks.times(t)
+        return self._stroke.times(t) if self._ahead and self._stroke is not None else self._clocks.times(t)
 
     def start(self, q0: FloatArray) -> FloatArray:
         """Where a rollout from q0 (nq,) begins: q0, or for a solver that keeps an objective extremal, on that set.
@@ -178,6 +237,23 @@ class Controller:
         Raises ShapeError, NonFiniteError, ConfigurationError, TargetError; afterwards the next good step works as if
         nothing had happened. A singularity is a status of ``command.solution``.
         """
+        stroke = self._stroke
+        if stroke is None:
+            return self._stepped(q, v, t)
+        if self.solver is stroke.solver and self.tasks is stroke.tasks and self.objective is None:
+            command = self._struck(stroke, q, v, t)
+            if command is not None:
+                return command
+        ahead = self._ahead
+        self._fall_back()
+        try:
+            return self._stepped(q, v, t)
+        except BaseException:  # a refused step leaves no trace
+            self._ahead = ahead
+            raise
+
+    def _stepped(self, q: FloatArray, v: FloatArray | None, t: float) -> Command:
+        """The general way: a Problem by the level, answered by the solver."""
         state = self.observe(q, v, t)
         if self.level.loads is not None:
             self.level.loads.time = t
@@ -203,9 +279,9 @@ class Controller:
         solution.guarded = guarded
         self._anchors, self._started = anchors, started  # only now: a refused step leaves no trace
         self._last = solution
-        self.step_times = times
+        self._step_times = times
         if self._waiting:
-            self._clocks.tick(t, times, references, problem.equations, solution.u)
+            self._clocks.tick(t, times, references, problem.equations, solution.u, self.tasks)
         return self.level.command(solution, references, state)
 
     @property
@@ -299,7 +375,8 @@ class Controller:
     @property
     def anchors(self) -> list[Any]:
         """What each task holds on to since the first step."""
-        return [None] * len(self.tasks) if self._anchors is None else self._anchors
+        anchors = self._stroke.memory.anchors if self._ahead and self._stroke is not None else self._anchors
+        return [None] * len(self.tasks) if anchors is None else anchors
 
 
 def _skipped(solution: Solution) -> bool:

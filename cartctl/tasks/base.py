@@ -50,6 +50,11 @@ class Task(ABC):
     """
 
     kind: ClassVar[str]
+    changes: int = 0  # how many attributes have been set so far: who has made arrays of a task looks at it
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        object.__setattr__(self, name, value)
+        object.__setattr__(self, "changes", self.changes + 1)
 
     def __init__(self, *, gain: Any, weight: float, fit: str, name: str) -> None:
         self.gain = checks.amounts("gain", gain, checks.PER_SECOND)
@@ -61,6 +66,11 @@ class Task(ABC):
     def frame(self) -> str | None:
         """The frame that moves, where there is one."""
         return None
+
+    @property
+    def rests(self) -> bool:
+        """Whether the target is known to stand still: then there is no path to wait for the hand."""
+        return False
 
     @property
     def target(self) -> Any:

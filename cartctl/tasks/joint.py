@@ -49,6 +49,11 @@ class JointTask(Task):
         size = None if self.joints is None else len(self.joints)
         self._point, self._path = point_target(value, label, size)
 
+    @property
+    def rests(self) -> bool:
+        """Whether it follows no path."""
+        return self._path is None
+
     def units(self, robot: Robot) -> list[str]:
         """Rad or m, one a joint."""
         return [_unit(robot, name) for name in self._names(robot)]
