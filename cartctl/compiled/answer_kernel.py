@@ -120,9 +120,9 @@ def _graded(s: Store, b: FloatArray, d: FloatArray, fits: IntArray, p: int, lost
 
 
 @part
-def _least_squares(s: Store) -> int:
+def _least_squares(s: Store, firsts: IntArray) -> int:
     """Damped least squares over all tasks, rows weighed by the root of their weight."""
-    n, p, firsts, kept, damping = s.ints[NV], s.ints[TASKS], index_in(s).first, 0, s.head[PARAMETER]
+    n, p, kept, damping = s.ints[NV], s.ints[TASKS], 0, s.head[PARAMETER]
     rows, b = np.empty((s.ints[ROWS], n)), np.empty(s.ints[ROWS])
     for k in range(p):
         weight = s.each[WEIGHT, k]
@@ -249,7 +249,7 @@ def by_dls(ints: IntArray, floats: FloatArray, t: float, u: FloatArray, out: Flo
     """The same by damped least squares."""
     s = opened(ints, floats)
     _begun(s)
-    return _ended(s, t, _least_squares(s), u, out)
+    return _ended(s, t, _least_squares(s, index_in(s).first), u, out)
 
 
 @kernel("int(out_int_store, out_store, float, out_store, out_store)", fast=True, alone=True, lean=True)
