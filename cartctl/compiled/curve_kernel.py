@@ -1,40 +1,14 @@
-"""Circles and ellipses with the laws of time this package has, worked out where they are needed.
-
-A path of anybody else's is asked itself; asked from Python, a circle takes as long as all the rest of a step.
-"""
+"""A point that runs round an ellipse by one of this package's laws of time: its pose and rates, inside a kernel."""
 
 from __future__ import annotations
 
 from math import cos, sin
-from typing import Any
-
-import numpy as np
 
 from cartctl.checks import FloatArray
 from cartctl.kernels import lean_part
-from cartctl.paths.base import Path
-from cartctl.paths.loop import Loop, PlaneLoop
-from cartctl.paths.timing import Quintic, SmoothTrapezoid
 
 # a curve: centre and two axes, the rotation held, then these
 START_ANGLE, PHASE, DURATION, RAMP, LENGTH = 18, 19, 20, 21, 22
-
-
-def curve_of(path: Any) -> FloatArray | None:
-    """Whether it leaves the orientation open, then its figures (24,); None for a path that is to be asked itself."""
-    if not isinstance(path, PlaneLoop) or type(path._law) not in (Quintic, SmoothTrapezoid):
-        return None
-    kind = type(path)
-    if (kind.__call__, kind._sample, kind._progress) != (Loop.__call__, PlaneLoop._sample, Path._progress):
-        return None
-    held, law = path._rotation, path._law
-    figures = np.zeros(25)
-    figures[0] = held is None
-    figures[1:10] = path._curve
-    figures[10:19] = np.eye(3).ravel() if held is None else held.ravel()
-    ramp = law.ramp if isinstance(law, SmoothTrapezoid) else 0.0
-    figures[1 + START_ANGLE : 1 + LENGTH] = path.start_angle, path._phase, path.duration, ramp
-    return figures
 
 
 @lean_part

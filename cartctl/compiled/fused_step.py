@@ -15,7 +15,7 @@ from cartctl import checks
 from cartctl.checks import LARGEST, FloatArray
 from cartctl.compiled import store_kernel as at
 from cartctl.compiled.answer_kernel import DLS, FAILED, SNS, by_dls, by_ranks, by_sns, told_size
-from cartctl.compiled.curve_kernel import curve_of
+from cartctl.compiled.curve import curve_of
 from cartctl.compiled.hold_kernel import held_back
 from cartctl.compiled.look_kernel import ASTRAY, RECOVERING, REFUSED, looked
 from cartctl.compiled.told import FusedCommand, Told
