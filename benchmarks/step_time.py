@@ -1,10 +1,11 @@
 """What one step costs: medians in us, and as ratios against raw calls made in the same run.
 
-    python benchmarks/step_time.py            # print the table
-    python benchmarks/step_time.py --save     # and write benchmarks/results/step_time.csv and the table in the README
+    python benchmarks/step_time.py            # print the tables
+    python benchmarks/step_time.py --save     # and write benchmarks/results/step_time.csv, whole_steps.csv, the README
 
 Rounds of all candidates are interleaved, so that a machine that changes its pace changes it for all of them; the ratio
-is the median of the rounds' ratios against Pinocchio's computeFrameJacobian.
+is the median of the rounds' ratios against Pinocchio's computeFrameJacobian. The second table is that of
+:mod:`whole_steps`: steps one by one, along a motion.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 from harness import interleaved, ratios, save_rows, setting, show
+from whole_steps import measured as whole_steps
 
 import cartctl as cc
 
@@ -67,8 +69,11 @@ def main() -> None:
     save = parser.parse_args().save
     found = ratios(interleaved(candidates()), REFERENCE)
     show(f"One step on the Panda, 7 dof, 6D pose; ratio to {REFERENCE}", found)
+    whole = whole_steps()
+    show("Steps one by one, along a motion under limits, sns", whole)
     if save:
         save_rows(RESULTS, found, setting())
+        save_rows(RESULTS.with_name("whole_steps.csv"), whole, setting())
         write_table(found, setting())
 
 

@@ -483,6 +483,25 @@ def test_back_and_forth_between_the_ways():
     assert_same(late, usual, late.step(q, v, 60e-3), usual.step(q, v, 60e-3))
 
 
+@pytest.mark.parametrize("kind", [cc.Controller, General])
+def test_a_target_at_rest_waits_for_nobody(kind):
+    """However slowly it is approached, its time goes on; so a path that is given later is joined where it is by then."""
+    robot = cc.load("panda")
+    hand = cc.FrameTask(robot.tool, target=robot.state(robot.home).position(robot.tool) + [0.0, 0.2, 0.1])
+    slow = robot.limits.replace(velocity_lower=-0.1, velocity_upper=0.1)
+    controller = kind(robot, [hand, cc.PostureTask()], solver="sns", limits=slow)
+    q, v = np.array(robot.home), np.zeros(7)
+    for k in range(80):
+        if k == 40:
+            hand.target = circle(robot, 0.15, 0.5)
+        command = controller.step(q, v, k * 1e-3)
+        assert command.solution.status.name == "SCALED"
+        late = k * 1e-3 - controller.step_times[0]
+        assert late == 0.0 if k <= 40 else late > 1e-4
+        assert controller.step_times[1] == k * 1e-3
+        q, v = robot.integrate(q, command.velocity * 1e-3), command.velocity
+
+
 def test_what_is_left_to_the_general_way():
     robot = cc.load("panda")
     hand = cc.FrameTask(robot.tool)

@@ -16,11 +16,11 @@ from cartctl.solvers.exact import kinds
 from cartctl.solvers.exact.lexicographic import lexicographic
 
 _SCALED, _FITTED = kinds.SCALED, kinds.FITTED
-_EXTREME, _STUCK, _LOST = kinds.EXTREME, kinds.STUCK, kinds.LOST_RANK
+_EXTREME, _STUCK, _LOST, _UNPROVEN = kinds.EXTREME, kinds.STUCK, kinds.LOST_RANK, kinds.UNPROVEN
 
 # what a step may come to; :mod:`cartctl.compiled.plan` knows their names
 OPTIMAL, SCALED, SKIPPED, SINGULAR, INEXACT, FAILED, RECOVERING, DAMPED, OVERDETERMINED = 0, 1, 2, 3, 4, 5, 6, 7, 8
-STATUSES = 9
+UNPROVEN, STATUSES = 9, 10
 SNS, DLS, TASK_PRIORITY = 0, 1, 2  # solvers
 AGAIN_BIT, LOST_BIT = 16, 32  # beside the status: a task was asked again, slowed towards rest; one lost rank
 
@@ -32,7 +32,7 @@ WEIGHT, FITTED, WAITS, NATURAL, PACE, SCALE, DELAY, SHARE, OWN, AGAIN, MADE, PAT
     at.WEIGHT, at.FITTED, at.WAITS, at.NATURAL, at.PACE, at.SCALE, at.DELAY, at.SHARE, at.OWN, at.AGAIN, at.MADE,
     at.PATH, at.CALM,
 )  # fmt: skip
-BEFORE, PARAMETER = at.BEFORE, at.PARAMETER
+BEFORE, BEGAN, PARAMETER = at.BEFORE, at.BEGAN, at.PARAMETER
 
 
 @lean_part
@@ -87,17 +87,16 @@ def _exact(s: Store) -> int:
                 _towards_rest(s, k, b, d)
                 again_fits[k] = _SCALED if k == 0 else _FITTED
         fits = again_fits[:p]
-    if flags & _EXTREME != 0 or not isfinite(_squared(u)):
+    if flags & (_EXTREME | _STUCK) != 0 or not isfinite(_squared(u)):
         active[0] = 0
         for j in range(u.shape[0]):
             u[j] = clamp(0.0, lower[j], upper[j]) if bounded > 0 else 0.0
         for k in range(p):
             scales[k] = 1.0
-        return FAILED | bits
-    if flags & _STUCK != 0:
-        return FAILED | bits
+        return FAILED
     lost = flags & _LOST != 0
-    return _graded(s, b, d, fits, p, lost) | bits | (LOST_BIT if lost else 0)
+    bits |= LOST_BIT if lost else 0
+    return bits | (UNPROVEN if flags & _UNPROVEN != 0 else _graded(s, b, d, fits, p, lost))
 
 
 @lean_part
@@ -185,7 +184,8 @@ def made(s: Store, t: float) -> None:
     for i in range(half):
         s.bent[half + i] = s.bent[i]
     s.head[BEFORE] = t
-    s.ints[BEGINS] = 0
+    if s.ints[BEGINS] != 0:
+        s.ints[BEGINS], s.head[BEGAN] = 0, t
     s.ints[COUNT] += 1
 
 

@@ -17,7 +17,7 @@ from cartctl.compiled import store_kernel as at
 from cartctl.compiled.answer_kernel import DLS, FAILED, SNS, by_dls, by_ranks, by_sns, told_size
 from cartctl.compiled.curve import curve_of
 from cartctl.compiled.hold_kernel import held_back
-from cartctl.compiled.look_kernel import ASTRAY, RECOVERING, REFUSED, looked
+from cartctl.compiled.look_kernel import ASTRAY, REFUSED, looked
 from cartctl.compiled.told import FusedCommand, Told
 from cartctl.compiled.workspace import Workspace
 from cartctl.errors import UnsupportedProblem
@@ -32,11 +32,13 @@ _REFUSED = REFUSED | ASTRAY
 class Memory(NamedTuple):
     """What lasts from step to step, task by task, as the general way holds it.
 
-    anchors: what each task holds on to, None before the first step. times: each task's own at the last step. delays,
-    shares: of the clocks. last: when the last step was. bent: how the arm was bent, (nv,) or None.
+    anchors: what each task holds on to, None before the first step. started: when that was. times: each task's own at
+    the last step. delays, shares: of the clocks. last: when the last step was. bent: how the arm was bent, (nv,) or
+    None.
     """
 
     anchors: list[Any] | None
+    started: float | None
     times: list[float]
     delays: list[float]
     shares: list[float]
@@ -107,7 +109,7 @@ class FusedStep:
         outcome = self._answer(ints, floats, t, u, out)
         if outcome & 15 == FAILED:
             return None
-        return FusedCommand(u, self._told, out, outcome, bits & RECOVERING != 0)
+        return FusedCommand(u, (self._told, out, outcome, bits != 0))
 
     def _refuse(self, q: FloatArray, v: FloatArray, t: float) -> None:
         """Say what is wrong with a state; one that is at the margin may pass."""
@@ -159,14 +161,14 @@ class FusedStep:
             own = t
             if self._waits:
                 own = t - each.item(at.DELAY, k) - (1.0 - each.item(at.SHARE, k)) * passed
-            s = path(own)
             try:
+                s = path(own)
                 rotation = s.rotation
                 each[at.OPEN_ROTATION, k] = rotation is None
                 if rotation is not None:
                     row[1:10].reshape(3, 3)[:] = rotation
                 row[10:13], row[13:19], row[19:25] = s.position, s.twist, s.acceleration
-            except (AttributeError, TypeError, ValueError):
+            except Exception:  # asked again by the general way, which is the one to speak
                 return False
         return True
 
@@ -178,9 +180,9 @@ class FusedStep:
         return [t - delay - (1.0 - share) * passed for delay, share in pairs]
 
     @property
-    def step_times(self) -> list[float]:
-        """Each task's own time at the last step."""
-        return self._store.each[at.MADE].tolist()  # type: ignore[no-any-return]
+    def step_times(self) -> list[float] | None:
+        """Each task's own time at the last step, None before the first one."""
+        return None if self._store.ints[at.BEGINS] else self._store.each[at.MADE].tolist()
 
     @property
     def memory(self) -> Memory:
@@ -198,7 +200,10 @@ class FusedStep:
         last = store.floats.item(at.BEFORE) if begun and self._waits else None
         kept = s.bent[p * (nv + 1) :].reshape(p, nv + 1)
         bent = [row[:nv].copy() if row[nv] else None for row in kept]
-        return Memory(anchors, self.step_times, each[at.DELAY].tolist(), each[at.SHARE].tolist(), last, bent)
+        started = store.floats.item(at.BEGAN) if begun else None
+        return Memory(
+            anchors, started, self.step_times or [], each[at.DELAY].tolist(), each[at.SHARE].tolist(), last, bent
+        )
 
     def resume(self, memory: Memory) -> None:
         """Go on from where the general way has come to."""
@@ -209,6 +214,8 @@ class FusedStep:
         store.floats[at.BEFORE] = 0.0 if memory.last is None else memory.last
         if memory.anchors is not None:
             store.ints[at.BEGINS] = 0
+            store.floats[at.BEGAN] = memory.started
+            each[at.MADE] = memory.times
             for k, anchor in enumerate(memory.anchors):
                 if isinstance(self.tasks[k], FrameTask):
                     row = s.twelve[2 * nv + p + k]

@@ -28,7 +28,7 @@ from cartctl.tasks import FrameTask, Task
 class Outcome:
     """What the loop found for B starts over N steps, M rows of p tasks; the history's arrays are empty if not kept.
 
-    q (B, nq), v (B, nv), error (B, M): at the end. least (B, p): the smallest scale. counts (B, 9): of each status.
+    q (B, nq), v (B, nv), error (B, M): at the end. least (B, p): the smallest scale. counts (B, 10): of each status.
     q_all, v_all, error_all (B, N + 1, ...), step_all (B, N + 1, 1 + 2 p): status, scales, own times.
     """
 

@@ -143,7 +143,7 @@ def roll(
     """Roll out every start q0 (B, nq), v0 (B, nv) by a store of its own, copied from the one that is given.
 
     nodes: the tables of all paths, each from begin[k] on. Fills the ends q_end, v_end and error_end (B, M), the least
-    scale of every task least (B, p), and how often each status was met, counts (B, 9). With room for them, every step,
+    scale of every task least (B, p), and how often each status was met, counts (B, 10). With room for them, every step,
     (B (N + 1), ...): q, v, error, and step_all of status, scales (p,) and the tasks' own times (p,).
     """
     own = (ints.copy(), floats.copy(), np.ascontiguousarray(nodes), begin.copy(), np.zeros(ints[TASKS], np.int64))

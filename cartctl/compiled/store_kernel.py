@@ -18,7 +18,7 @@ from cartctl.levels.approach_kernel import ROWS as DIRECTION_ROWS
 NQ, NV, TASKS, ROWS, LARGEST, BOUNDED, HELD, LAST, BEGINS, COUNT, SOLVER, STEPS = 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11
 INTS_HEAD = 12
 # the numbers' head: six of room at its end
-DT, PARAMETER, BEFORE, START, SIX, HEAD = 0, 1, 2, 3, 4, 10
+DT, PARAMETER, BEFORE, START, BEGAN, SIX, HEAD = 0, 1, 2, 3, 4, 5, 11
 
 # rows of ``wide``, nv each: 11 of the limits, 3 of the approach, then
 LIMITS, JOINTS, U, AT, LOWER, UPPER, X, Y, J, A = 0, 11, 14, 15, 16, 17, 18, 19, 20, 26
@@ -156,7 +156,7 @@ def straightened(s: Store) -> None:
 def forgotten(s: Store) -> None:
     """As before the first step."""
     p = s.ints[TASKS]
-    s.ints[BEGINS], s.ints[COUNT], s.head[BEFORE] = 1, 0, 0.0
+    s.ints[BEGINS], s.ints[COUNT], s.head[BEFORE], s.head[BEGAN] = 1, 0, 0.0, 0.0
     index_in(s).active[0] = 0
     for k in range(p):
         s.each[DELAY, k], s.each[SHARE, k], s.each[PACE, k] = 0.0, 1.0, 1.0

@@ -88,26 +88,30 @@ class Told:
 class FusedCommand(Command):
     """A Command that holds a copy of its step, and makes solution and references of it when asked."""
 
-    __slots__ = ("_known", "_outcome", "_out", "_recovering", "_references", "_told")
+    __slots__ = ("_known", "_said", "_step")
+    acceleration = None
+    _torque = None
 
-    def __init__(self, u: FloatArray, told: Told, out: FloatArray, outcome: int, recovering: bool) -> None:
+    def __init__(self, u: FloatArray, step: tuple[Told, FloatArray, int, bool]) -> None:
         self.velocity = u
-        self.acceleration = self._torque = None
-        self._told, self._out, self._outcome, self._recovering = told, out, outcome, recovering
-        self._known: Solution | None = None
-        self._references: list[Reference] | None = None
+        self._step = step  # two attributes, and no more until somebody asks
 
     @property
     def solution(self) -> Solution:  # type: ignore[override]
         """The Solution behind it."""
-        if self._known is None:
+        try:
+            return self._known
+        except AttributeError:
+            told, out, outcome, recovering = self._step
             assert self.velocity is not None
-            self._known = self._told.solution(self.velocity, self._out, self._outcome, self._recovering)
-        return self._known
+            self._known: Solution = told.solution(self.velocity, out, outcome, recovering)
+            return self._known
 
     @property
     def references(self) -> list[Reference]:  # type: ignore[override]
         """Each task's error and target rates at this step."""
-        if self._references is None:
-            self._references = self._told.references(self._out)
-        return self._references
+        try:
+            return self._said
+        except AttributeError:
+            self._said: list[Reference] = self._step[0].references(self._step[1])
+            return self._said

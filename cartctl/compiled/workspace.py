@@ -31,6 +31,7 @@ NAMES = (
     Status.RECOVERING,
     Status.DAMPED,
     Status.OVERDETERMINED,
+    Status.UNPROVEN,
 )  # in the kernels' order
 assert len(NAMES) == STATUSES
 

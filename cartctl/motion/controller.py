@@ -187,16 +187,11 @@ class Controller:
         except (UnsupportedProblem, UnsupportedJoint):
             return None
 
-    def _struck(self, stroke: FusedStep, q: FloatArray, v: FloatArray | None, t: float) -> Command | None:
-        """A step by that way, from where the general one has come to."""
-        if not self._ahead:
-            kept = Memory(self._anchors, [], *self._clocks.kept, self._confining.bends(self.tasks))
-            stroke.resume(kept)
-            self._ahead = True
-        command = stroke.step(q, v, t)
-        if command is not None and self._started is None:
-            self._started = t
-        return command
+    def _hand_over(self, stroke: FusedStep) -> None:
+        """Let that way go on from where the general one has come to."""
+        lasting = (*self._clocks.kept, self._confining.bends(self.tasks))
+        stroke.resume(Memory(self._anchors, self._started, self._step_times, *lasting))
+        self._ahead = True
 
     def _fall_back(self) -> None:
         """Take what lasts back from the stroke."""
@@ -204,7 +199,7 @@ class Controller:
             return
         memory = self._stroke.memory
         self._ahead = False
-        self._anchors, self._last = memory.anchors, None
+        self._anchors, self._started, self._last = memory.anchors, memory.started, None
         if memory.anchors is not None:
             self._step_times = memory.times
         self._clocks.resume(memory.delays, memory.shares, memory.last)
@@ -213,9 +208,8 @@ class Controller:
     @property
     def step_times(self) -> list[float]:
         """Each task's own time at the last step."""
-        if self._ahead and self._stroke is not None and self._started is not None:
-            return self._stroke.step_times
-        return self._step_times
+        times = self._stroke.step_times if self._ahead and self._stroke is not None else None
+        return self._step_times if times is None else times
 
     def times(self, t: float) -> list[float]:
         """Each task's own time when everybody else's is t: later by what its path has waited."""
@@ -241,7 +235,9 @@ class Controller:
         if stroke is None:
             return self._stepped(q, v, t)
         if self.solver is stroke.solver and self.tasks is stroke.tasks and self.objective is None:
-            command = self._struck(stroke, q, v, t)
+            if not self._ahead:
+                self._hand_over(stroke)
+            command = stroke.step(q, v, t)
             if command is not None:
                 return command
         ahead = self._ahead
