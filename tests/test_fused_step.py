@@ -485,7 +485,7 @@ def test_back_and_forth_between_the_ways():
 
 @pytest.mark.parametrize("kind", [cc.Controller, General])
 def test_a_target_at_rest_waits_for_nobody(kind):
-    """However slowly it is approached, its time goes on; so a path that is given later is joined where it is by then."""
+    """However slowly it is approached, its time goes on; a path that is given later is joined where it is by then."""
     robot = cc.load("panda")
     hand = cc.FrameTask(robot.tool, target=robot.state(robot.home).position(robot.tool) + [0.0, 0.2, 0.1])
     slow = robot.limits.replace(velocity_lower=-0.1, velocity_upper=0.1)
