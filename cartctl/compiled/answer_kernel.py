@@ -22,11 +22,12 @@ _EXTREME, _STUCK, _LOST, _UNPROVEN = kinds.EXTREME, kinds.STUCK, kinds.LOST_RANK
 OPTIMAL, SCALED, SKIPPED, SINGULAR, INEXACT, FAILED, RECOVERING, DAMPED, OVERDETERMINED = 0, 1, 2, 3, 4, 5, 6, 7, 8
 UNPROVEN, STATUSES = 9, 10
 SNS, DLS, TASK_PRIORITY = 0, 1, 2  # solvers
-AGAIN_BIT, LOST_BIT = 16, 32  # beside the status: a task was asked again, slowed towards rest; one lost rank
+AGAIN_BIT, LOST_BIT = 16, 32  # beside the status: a task was asked again for something else; one lost rank
+_BEYOND = 1e-6  # of a command: a part as large that cannot be obeyed
 
 NV, TASKS, ROWS, BOUNDED, LAST, BEGINS, COUNT = at.NV, at.TASKS, at.ROWS, at.BOUNDED, at.LAST, at.BEGINS, at.COUNT
-A, U, LOWER, UPPER, B, B_AGAIN, D_AGAIN, HIGH, ERROR, RATE, BEND = (
-    at.A, at.U, at.LOWER, at.UPPER, at.B, at.B_AGAIN, at.D_AGAIN, at.HIGH, at.ERROR, at.RATE, at.BEND,
+A, U, X, LOWER, UPPER, B, B_AGAIN, D_AGAIN, HIGH, ERROR, RATE, BEND = (
+    at.A, at.U, at.X, at.LOWER, at.UPPER, at.B, at.B_AGAIN, at.D_AGAIN, at.HIGH, at.ERROR, at.RATE, at.BEND,
 )  # fmt: skip
 WEIGHT, FITTED, WAITS, NATURAL, PACE, SCALE, DELAY, SHARE, OWN, AGAIN, MADE, PATH, CALM = (
     at.WEIGHT, at.FITTED, at.WAITS, at.NATURAL, at.PACE, at.SCALE, at.DELAY, at.SHARE, at.OWN, at.AGAIN, at.MADE,
@@ -44,14 +45,37 @@ def _squared(u: FloatArray) -> float:
 
 
 @lean_part
-def _towards_rest(s: Store, k: int, b: FloatArray, d: FloatArray) -> None:
-    """Ask task k for ``A u = A u_b + s (b - A u_b)``, or below the highest to stand: ``A u = A u_b``."""
+def _slowed(s: Store, k: int, b: FloatArray, d: FloatArray) -> None:
+    """Ask task k for ``A u = A u_b + s (b - A u_b)``, or below the highest to stand: :mod:`cartctl.motion.fallback`."""
     first, bounded = index_in(s).first, s.ints[BOUNDED]
     for i in range(first[k], first[k + 1]):
         rest = 0.0
         for j in range(bounded):
             rest += s.wide[A + i, j] * clamp(0.0, s.wide[LOWER, j], s.wide[UPPER, j])
         b[i], d[i] = (b[i] - rest, -rest) if k == 0 else (rest, 0.0)
+
+
+@lean_part
+def _beyond_reach(s: Store) -> bool:
+    """Whether the highest task's command cannot be obeyed as it is; what of it can is then in B_AGAIN."""
+    index, nothing, none = index_in(s), s.head[:0], s.square[:0, :0]
+    m, x, active, fits = index.first[1], s.wide[X], index.active, index.again
+    rows, b, again = s.wide[A : A + m], s.high[B, :m], s.high[B_AGAIN]
+    active[0], fits[0] = 0, _FITTED
+    lexicographic(
+        rows, b, nothing, index.counts[:1], fits[:1], s.each[NATURAL, :1], nothing, nothing, none, nothing, nothing,
+        nothing, active, x, s.each[AGAIN, :1], active, none,
+    )  # fmt: skip
+    active[0] = 0
+    missed, asked = 0.0, 0.0
+    for i in range(m):
+        along = 0.0
+        for j in range(x.shape[0]):
+            along += rows[i, j] * x[j]
+        again[i] = along
+        missed += (b[i] - along) * (b[i] - along)
+        asked += b[i] * b[i]
+    return missed > _BEYOND * _BEYOND * asked and isfinite(missed)
 
 
 @lean_part
@@ -65,26 +89,41 @@ def _exact(s: Store) -> int:
     b, d, sizes, fits = s.high[B, :m], nothing, index_in(s).counts[:p], index_in(s).fits[:p]
     u0 = s.high[B, m:] if s.ints[LAST] != 0 else nothing
     natural, scales = s.each[NATURAL, :p], s.each[SCALE, :p]
-    flags, bits = 0, 0
-    for turn in range(2):
+    flags, bits, slowed = 0, 0, False
+    for turn in range(3):
         flags = lexicographic(
             rows, b, d, sizes, fits, natural, lower, upper, none, nothing, nothing, u0, active, u, scales, active, none,
         )  # fmt: skip
         again = False
         for k in range(p):
             again = again or scales[k] != scales[k]
-        if turn == 1 or not again or flags & _EXTREME != 0:
+        if slowed or flags & _EXTREME != 0:
             break
-        # a task with no feasible scale is slowed towards standing still
-        bits, again_fits = AGAIN_BIT, index_in(s).again
+        if turn == 0 and not again and flags & _LOST != 0 and fits[0] == _SCALED and scales[0] == 0.0:
+            # no more than the part of the command that the robot can obey here
+            beyond = _beyond_reach(s)
+            s.each[AGAIN, 0] = 0.0
+            if not beyond:
+                break
+            bits, s.each[AGAIN, 0] = AGAIN_BIT, 1.0
+            for i in range(m):
+                s.high[D_AGAIN, i] = 0.0
+                if i >= firsts[1]:
+                    s.high[B_AGAIN, i] = b[i]
+            b, d = s.high[B_AGAIN, :m], s.high[D_AGAIN, :m]
+            continue
+        if not again:
+            break
+        # a task with no feasible scale is slowed
+        bits, again_fits, slowed = AGAIN_BIT, index_in(s).again, True
         for i in range(m):
             s.high[B_AGAIN, i], s.high[D_AGAIN, i] = b[i], 0.0
         b, d = s.high[B_AGAIN, :m], s.high[D_AGAIN, :m]
         for k in range(p):
             again_fits[k] = fits[k]
-            s.each[AGAIN, k] = 1.0 if scales[k] != 1.0 else 0.0
+            s.each[AGAIN, k] = 1.0 if scales[k] != 1.0 else s.each[AGAIN, k]
             if scales[k] != 1.0:
-                _towards_rest(s, k, b, d)
+                _slowed(s, k, b, d)
                 again_fits[k] = _SCALED if k == 0 else _FITTED
         fits = again_fits[:p]
     if flags & (_EXTREME | _STUCK) != 0 or not isfinite(_squared(u)):

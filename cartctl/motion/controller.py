@@ -38,10 +38,11 @@ from cartctl.model.state import State
 from cartctl.motion.clock import PathClocks
 from cartctl.motion.confining import Confining
 from cartctl.motion.extremal_start import onto_extremal_set
-from cartctl.motion.fallback import towards_rest
+from cartctl.motion.fallback import slowed, within_reach
 from cartctl.motion.limiting import ROBOT_LIMITS, RobotLimits, usable_limits
 from cartctl.objectives.base import Objective
 from cartctl.solvers import Solver, get_solver, solvers_that_honour
+from cartctl.solvers.sns import SNS
 from cartctl.tasks.base import Task
 
 
@@ -314,13 +315,13 @@ class Controller:
             p = problem = problem or solution.problem
             bounds = (p.lower, p.upper, blocks)
             p = Problem.trusted(p.equations, p.metric, p.reference, *bounds)
-            solution = self._solve(p, state, solution, midway.state)
+            solution = self._solve(p, state, solution, at=midway.state)
         return solution
 
     def _solve(self, problem: Problem, state: State, start: Solution | None, at: State | None = None) -> Solution:
         """The solver's answer, from an earlier one; where limits exclude each other they yield in their order.
 
-        A task with no feasible scale is slowed towards standing still. at: where M and h are taken from, if not from
+        A task with no feasible scale but 0 is asked for what it can do. at: where M and h are taken from, if not from
         the state.
         """
         solution = self.solver.solve(problem, start)
@@ -332,15 +333,24 @@ class Controller:
                 solution = self.solver.solve(problem)
                 if missed(solution):
                     solution = Solution(problem, best, self.solver.name, status=Status.INFEASIBLE)
+        if self._stands_still(solution) and (reachable := within_reach(problem, self.solver.solve)) is not None:
+            problem, solution = reachable, self.solver.solve(reachable)
         if _skipped(solution) or (self._confining.yields and solution.failed):
             stopping = self._confining.stopping(problem, state, at)
-            again = towards_rest(problem, ~(solution.scales == 1.0), stopping)
+            again = slowed(problem, ~(solution.scales == 1.0), stopping)
             solution = self.solver.solve(again, solution)
             if self._confining.yields and (_skipped(solution) or solution.failed):
                 skipped = np.full(len(again.equations), np.nan)  # what is left is to brake, within all bounds
                 solution = Solution(again, stopping, self.solver.name, status=Status.SKIPPED, scales=skipped)
         solution.recovering, solution.yielded = self._confining.recovering, yielded
         return solution
+
+    def _stands_still(self, solution: Solution) -> bool:
+        """Whether the first task's command is scaled to nothing, and a task has lost rank."""
+        if not (solution.lost_rank and type(self.solver) is SNS and not _skipped(solution)):
+            return False
+        first = solution.problem.equations[0]
+        return first.fit == "scale" and first.drift is None and bool(solution.scales[0] == 0.0)
 
     def _secondary(self, elapsed: float) -> Secondary:
         """The objective, its share rising as 3 x^2 - 2 x^3 over the soft start."""
