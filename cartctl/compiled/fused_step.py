@@ -1,6 +1,6 @@
 """A controller's step at the velocity level at one stroke: the kernels of the rollouts, on a store that lasts.
 
-The general way makes a Problem of Python objects and has it answered; here a step is two or three compiled calls, and
+The general way makes a Problem of Python objects and has it answered; here a step is one compiled call, and
 Problem, references and Solution are put together when somebody asks a command for them, from a copy of that step.
 """
 
@@ -14,10 +14,10 @@ import numpy as np
 from cartctl import checks
 from cartctl.checks import LARGEST, FloatArray
 from cartctl.compiled import store_kernel as at
-from cartctl.compiled.answer_kernel import DLS, FAILED, SNS, by_dls, by_ranks, by_sns, told_size
+from cartctl.compiled.answer_kernel import DLS, FAILED, SNS, told_size
 from cartctl.compiled.curve import curve_of
-from cartctl.compiled.hold_kernel import held_back
-from cartctl.compiled.look_kernel import ASTRAY, REFUSED, looked
+from cartctl.compiled.look_kernel import REFUSED
+from cartctl.compiled.step_kernel import BITS, LEFT, OUTCOME, step_dls, step_ranks, step_sns
 from cartctl.compiled.told import FusedCommand, Told
 from cartctl.compiled.workspace import Workspace
 from cartctl.errors import UnsupportedProblem
@@ -26,7 +26,7 @@ from cartctl.solvers import Solver
 from cartctl.tasks import FrameTask, Task
 
 _FLOAT = np.dtype(np.float64)
-_REFUSED = REFUSED | ASTRAY
+_REFUSED = BITS * REFUSED
 
 
 class Memory(NamedTuple):
@@ -62,17 +62,15 @@ class FusedStep:
         self.tasks, self.solver = tasks, solver
         self._robot, self._store = robot, Workspace(robot, tasks, solver, packed, joints, waits, dt)
         code = self._store.ints[at.SOLVER]
-        kernel = by_sns if code == SNS else by_dls if code == DLS else by_ranks
-        self._look: Callable[..., int] = looked.compiled
-        self._hold: Callable[..., None] | None = None if joints is None else held_back.compiled
-        self._answer: Callable[..., int] = kernel.compiled
+        kernel = step_sns if code == SNS else step_dls if code == DLS else step_ranks
+        self._kernel: Callable[..., int] = kernel.compiled
         self._arrays = (self._store.ints, self._store.floats)
         self._shape, self._rates = (robot.nq,), (robot.nv,)
         self._still = np.zeros(robot.nv)
         self._nv, self._size = robot.nv, told_size(robot.nv, len(tasks), self._store.rows)
         self._waits = any(waits)
         self._bounded = packed is not None
-        self._seen = [-1] * len(tasks)
+        self._seen, self._latest = [-1] * len(tasks), -1
         self._expressed = self._take_over()
 
     def step(self, q: Any, v: Any, t: Any) -> FusedCommand | None:
@@ -88,28 +86,26 @@ class FusedStep:
             v = checks.vector("v", v, self._nv, largest=LARGEST)
         if type(t) is not float:
             t = checks.number("t", t)
-        for task, seen in zip(self.tasks, self._seen):  # noqa: B905 - equally long by construction, in a hot loop
-            if task.changes != seen:
+        latest = Task.latest
+        if latest != self._latest:  # of any task
+            if [task.changes for task in self.tasks] != self._seen:
                 self._expressed = self._take_over()
-                break
-        for task, row in self._gains:
-            row[:] = task.gain
+            self._latest = latest
+        if self._gains:
+            for task, row in self._gains:
+                row[:] = task.gain
         if not self._expressed or (self._paths and not self._sample(t)):
             return None
         ints, floats = self._arrays
-        bits = self._look(ints, floats, q, v, t)
-        if bits:
-            if bits & REFUSED:
-                self._refuse(q, v, t)
-            if bits & _REFUSED:
-                return None
-        if self._hold is not None:
-            self._hold(ints, floats)
         u, out = np.empty(self._nv), np.empty(self._size)
-        outcome = self._answer(ints, floats, t, u, out)
-        if outcome & 15 == FAILED:
+        found = self._kernel(ints, floats, q, v, t, u, out)
+        if found & LEFT:
+            if found & _REFUSED:
+                self._refuse(q, v, t)
             return None
-        return FusedCommand(u, (self._told, out, outcome, bits != 0))
+        if found & 15 == FAILED:
+            return None
+        return FusedCommand(u, (self._told, out, found & OUTCOME, found >= BITS))
 
     def _refuse(self, q: FloatArray, v: FloatArray, t: float) -> None:
         """Say what is wrong with a state; one that is at the margin may pass."""
