@@ -70,6 +70,7 @@ class FusedStep:
         self._nv, self._size = robot.nv, told_size(robot.nv, len(tasks), self._store.rows)
         self._waits = any(waits)
         self._bounded = packed is not None
+        self._anchors: list[Any] | None = None
         self._seen, self._latest = [-1] * len(tasks), -1
         self._expressed = self._take_over()
 
@@ -181,31 +182,38 @@ class FusedStep:
         return None if self._store.ints[at.BEGINS] else self._store.each[at.MADE].tolist()
 
     @property
+    def anchors(self) -> list[Any] | None:
+        """What each task holds on to since the first step, None before it."""
+        store, nv, p = self._store, self._nv, len(self.tasks)
+        if store.ints[at.BEGINS]:
+            return None
+        if self._anchors is None:
+            poses = store.store.twelve[2 * nv + p : 2 * nv + 2 * p].copy()
+            found = store.high[at.FOUND].copy()
+            self._anchors = [
+                task.holding(pose[9:], pose[:9].reshape(3, 3)) if isinstance(task, FrameTask) else found[a:b]
+                for task, pose, a, b in zip(self.tasks, poses, store.first[:-1], store.first[1:], strict=True)
+            ]
+        return self._anchors
+
+    @property
     def memory(self) -> Memory:
         """What lasts, for the general way to go on from."""
         store, each, nv = self._store, self._store.each, self._nv
         s, p, begun = store.store, len(self.tasks), not store.ints[at.BEGINS]
-        anchors: list[Any] | None = None
-        if begun:
-            poses = s.twelve[2 * nv + p : 2 * nv + 2 * p].copy()
-            found = store.high[at.FOUND].copy()
-            anchors = [
-                task.holding(pose[9:], pose[:9].reshape(3, 3)) if isinstance(task, FrameTask) else found[a:b]
-                for task, pose, a, b in zip(self.tasks, poses, store.first[:-1], store.first[1:], strict=True)
-            ]
         last = store.floats.item(at.BEFORE) if begun and self._waits else None
         kept = s.bent[p * (nv + 1) :].reshape(p, nv + 1)
         bent = [row[:nv].copy() if row[nv] else None for row in kept]
         started = store.floats.item(at.BEGAN) if begun else None
-        return Memory(
-            anchors, started, self.step_times or [], each[at.DELAY].tolist(), each[at.SHARE].tolist(), last, bent
-        )
+        delays, shares = each[at.DELAY].tolist(), each[at.SHARE].tolist()
+        return Memory(self.anchors, started, self.step_times or [], delays, shares, last, bent)
 
     def resume(self, memory: Memory) -> None:
         """Go on from where the general way has come to."""
         store, each, nv = self._store, self._store.each, self._nv
         s, p = store.store, len(self.tasks)
         at.forgotten(s)
+        self._anchors = None
         each[at.DELAY], each[at.SHARE] = memory.delays, memory.shares
         store.floats[at.BEFORE] = 0.0 if memory.last is None else memory.last
         if memory.anchors is not None:

@@ -128,6 +128,8 @@ class Controller:
         self._anchors: list[Any] | None = None
         self._started: float | None = None
         self._stroke = self._at_one_stroke()
+        if self._stroke is None:
+            self._confining.prepare()
         self._ahead = False  # whether what lasts is with the stroke, and what is here is out of date
 
     def reset(self) -> None:
@@ -152,6 +154,8 @@ class Controller:
         self._fall_back()
         self._confining, self._limits = confining, limits
         self._stroke = self._at_one_stroke()
+        if self._stroke is None:
+            confining.prepare()
 
     def compiled_limits(self) -> tuple[FloatArray | None, FloatArray | None, list[bool]]:
         """What a compiled loop needs to know of the limits: (11, nv), (3, nv) of the approach, and whose paths wait.
@@ -371,7 +375,7 @@ class Controller:
     @property
     def anchors(self) -> list[Any]:
         """What each task holds on to since the first step."""
-        anchors = self._stroke.memory.anchors if self._ahead and self._stroke is not None else self._anchors
+        anchors = self._stroke.anchors if self._ahead and self._stroke is not None else self._anchors
         return [None] * len(self.tasks) if anchors is None else anchors
 
 
