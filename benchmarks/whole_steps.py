@@ -19,12 +19,18 @@ import cartctl as cc
 STEPS, REPLAYS = 2000, 5
 
 
-def panda(**given: Any) -> cc.Controller:
+class General(cc.Controller):
+    """One that goes the general way, as controllers with constraints, objectives or other tasks do."""
+
+    _fuses = False
+
+
+def panda(kind: type[cc.Controller] = cc.Controller, **given: Any) -> cc.Controller:
     """The job's."""
     robot = cc.load("panda")
     start = robot.state(robot.home).placement(robot.tool)
     hand = cc.FrameTask(robot.tool, gain=20.0, target=cc.Circle.starting_at(start, 0.1, period=4.0))
-    return cc.Controller(robot, [hand, cc.PostureTask()], solver="sns", **given)
+    return kind(robot, [hand, cc.PostureTask()], solver="sns", **given)
 
 
 def talos(**given: Any) -> cc.Controller:
@@ -52,6 +58,8 @@ def controllers() -> dict[str, cc.Controller]:
         "Panda, saturated": slow(panda, 0.1),
         "Panda, unsaturated, approach=False": panda(approach=False),
         "Panda, saturated, approach=False": slow(panda, 0.1, approach=False),
+        "Panda, unsaturated, the general way": panda(General),
+        "Panda, unsaturated, the general way, approach=False": panda(General, approach=False),
         "Talos, 4 tasks, unsaturated": talos(),
         "Talos, 4 tasks, saturated": slow(talos, 0.02),
     }

@@ -10,8 +10,8 @@ from cartctl.braking import clamp
 from cartctl.checks import FloatArray, IntArray
 from cartctl.compiled import store_kernel as at
 from cartctl.compiled.solve_kernel import damped, least_above, met, ranked
-from cartctl.compiled.store_kernel import Store, index_in, opened
-from cartctl.kernels import kernel, lean_part, part
+from cartctl.compiled.store_kernel import Store, index_in
+from cartctl.kernels import lean_part, part
 from cartctl.solvers.exact import kinds
 from cartctl.solvers.exact.lexicographic import lexicographic
 
@@ -79,7 +79,7 @@ def _beyond_reach(s: Store) -> bool:
 
 
 @lean_part
-def _exact(s: Store) -> int:
+def exact(s: Store) -> int:
     """The exact optimum: how it went, and the bits."""
     p = s.ints[TASKS] - s.ints[LAST]
     firsts, bounded = index_in(s).first, s.ints[BOUNDED]
@@ -158,7 +158,7 @@ def _graded(s: Store, b: FloatArray, d: FloatArray, fits: IntArray, p: int, lost
 
 
 @part
-def _least_squares(s: Store, firsts: IntArray) -> int:
+def least_squares(s: Store, firsts: IntArray) -> int:
     """Damped least squares over all tasks, rows weighed by the root of their weight."""
     n, p, kept, damping = s.ints[NV], s.ints[TASKS], 0, s.head[PARAMETER]
     rows, b = np.empty((s.ints[ROWS], n)), np.empty(s.ints[ROWS])
@@ -192,7 +192,8 @@ def _all_met(s: Store) -> bool:
 
 
 @lean_part
-def _by_ranks(s: Store) -> int:
+def by_ranks(s: Store) -> int:
+    """Task priority with truncated inverses."""
     m, sizes, natural = s.ints[ROWS], index_in(s).counts, s.each[NATURAL]
     if ranked(s.wide[A : A + m], s.high[B], sizes, natural, s.head[PARAMETER], s.wide[U]):
         return SINGULAR | LOST_BIT
@@ -229,7 +230,7 @@ def made(s: Store, t: float) -> None:
 
 
 @lean_part
-def _told(s: Store, u: FloatArray, out: FloatArray) -> None:
+def told(s: Store, u: FloatArray, out: FloatArray) -> None:
     """Copy u, and for whoever looks at the step later: bounds, five of ``each``, six of ``high``, A."""
     n, p, m = s.ints[NV], s.ints[TASKS], s.ints[ROWS]
     for j in range(n):
@@ -255,48 +256,6 @@ def _told(s: Store, u: FloatArray, out: FloatArray) -> None:
     for i in range(m):
         for j in range(n):
             out[a + i * n + j] = s.wide[A + i, j]
-
-
-@lean_part
-def _begun(s: Store) -> None:
-    for k in range(s.ints[TASKS]):
-        s.each[SCALE, k], s.each[AGAIN, k] = 1.0, 0.0
-
-
-@lean_part
-def _ended(s: Store, t: float, outcome: int, u: FloatArray, out: FloatArray) -> int:
-    if outcome & 15 != FAILED or out.shape[0] == 0:
-        made(s, t)
-        if out.shape[0] > 0:
-            _told(s, u, out)
-    return outcome
-
-
-@kernel("int(out_int_store, out_store, float, out_store, out_store)", fast=True, alone=True, lean=True)
-def by_sns(ints: IntArray, floats: FloatArray, t: float, u: FloatArray, out: FloatArray) -> int:
-    """Fill u (nv,) by the exact engine: how it went, and the bits.
-
-    out: room for a copy of the step, :func:`told_size`; empty, as u then, where u is taken from the store.
-    """
-    s = opened(ints, floats)
-    _begun(s)
-    return _ended(s, t, _exact(s), u, out)
-
-
-@kernel("int(out_int_store, out_store, float, out_store, out_store)", fast=True, alone=True, lean=True)
-def by_dls(ints: IntArray, floats: FloatArray, t: float, u: FloatArray, out: FloatArray) -> int:
-    """The same by damped least squares."""
-    s = opened(ints, floats)
-    _begun(s)
-    return _ended(s, t, _least_squares(s, index_in(s).first), u, out)
-
-
-@kernel("int(out_int_store, out_store, float, out_store, out_store)", fast=True, alone=True, lean=True)
-def by_ranks(ints: IntArray, floats: FloatArray, t: float, u: FloatArray, out: FloatArray) -> int:
-    """The same by task priority."""
-    s = opened(ints, floats)
-    _begun(s)
-    return _ended(s, t, _by_ranks(s), u, out)
 
 
 def told_size(n: int, p: int, m: int) -> int:

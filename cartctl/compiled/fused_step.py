@@ -1,23 +1,24 @@
 """A controller's step at the velocity level at one stroke: the kernels of the rollouts, on a store that lasts.
 
-The general way makes a Problem of Python objects and has it answered; here a step is two or three compiled calls, and
+The general way makes a Problem of Python objects and has it answered; here a step is one compiled call, and
 Problem, references and Solution are put together when somebody asks a command for them, from a copy of that step.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from cartctl import checks
 from cartctl.checks import LARGEST, FloatArray
 from cartctl.compiled import store_kernel as at
-from cartctl.compiled.answer_kernel import DLS, FAILED, SNS, by_dls, by_ranks, by_sns, told_size
+from cartctl.compiled.answer_kernel import DLS, FAILED, SNS, told_size
 from cartctl.compiled.curve import curve_of
-from cartctl.compiled.hold_kernel import held_back
-from cartctl.compiled.look_kernel import ASTRAY, REFUSED, looked
+from cartctl.compiled.lasting import Lasting
+from cartctl.compiled.look_kernel import REFUSED
+from cartctl.compiled.step_kernel import BITS, LEFT, OUTCOME, step_dls, step_ranks, step_sns
 from cartctl.compiled.told import FusedCommand, Told
 from cartctl.compiled.workspace import Workspace
 from cartctl.errors import UnsupportedProblem
@@ -26,24 +27,7 @@ from cartctl.solvers import Solver
 from cartctl.tasks import FrameTask, Task
 
 _FLOAT = np.dtype(np.float64)
-_REFUSED = REFUSED | ASTRAY
-
-
-class Memory(NamedTuple):
-    """What lasts from step to step, task by task, as the general way holds it.
-
-    anchors: what each task holds on to, None before the first step. started: when that was. times: each task's own at
-    the last step. delays, shares: of the clocks. last: when the last step was. bent: how the arm was bent, (nv,) or
-    None.
-    """
-
-    anchors: list[Any] | None
-    started: float | None
-    times: list[float]
-    delays: list[float]
-    shares: list[float]
-    last: float | None
-    bent: list[FloatArray | None]
+_REFUSED = BITS * REFUSED
 
 
 class FusedStep:
@@ -61,18 +45,16 @@ class FusedStep:
     ) -> None:
         self.tasks, self.solver = tasks, solver
         self._robot, self._store = robot, Workspace(robot, tasks, solver, packed, joints, waits, dt)
+        self.lasting = Lasting(self._store)
         code = self._store.ints[at.SOLVER]
-        kernel = by_sns if code == SNS else by_dls if code == DLS else by_ranks
-        self._look: Callable[..., int] = looked.compiled
-        self._hold: Callable[..., None] | None = None if joints is None else held_back.compiled
-        self._answer: Callable[..., int] = kernel.compiled
+        kernel = step_sns if code == SNS else step_dls if code == DLS else step_ranks
+        self._kernel: Callable[..., int] = kernel.compiled
         self._arrays = (self._store.ints, self._store.floats)
         self._shape, self._rates = (robot.nq,), (robot.nv,)
         self._still = np.zeros(robot.nv)
         self._nv, self._size = robot.nv, told_size(robot.nv, len(tasks), self._store.rows)
-        self._waits = any(waits)
         self._bounded = packed is not None
-        self._seen = [-1] * len(tasks)
+        self._seen, self._latest = [-1] * len(tasks), -1
         self._expressed = self._take_over()
 
     def step(self, q: Any, v: Any, t: Any) -> FusedCommand | None:
@@ -88,28 +70,26 @@ class FusedStep:
             v = checks.vector("v", v, self._nv, largest=LARGEST)
         if type(t) is not float:
             t = checks.number("t", t)
-        for task, seen in zip(self.tasks, self._seen):  # noqa: B905 - equally long by construction, in a hot loop
-            if task.changes != seen:
+        latest = Task.latest
+        if latest != self._latest:  # of any task
+            if [task.changes for task in self.tasks] != self._seen:
                 self._expressed = self._take_over()
-                break
-        for task, row in self._gains:
-            row[:] = task.gain
+            self._latest = latest
+        if self._gains:
+            for task, row in self._gains:
+                row[:] = task.gain
         if not self._expressed or (self._paths and not self._sample(t)):
             return None
         ints, floats = self._arrays
-        bits = self._look(ints, floats, q, v, t)
-        if bits:
-            if bits & REFUSED:
-                self._refuse(q, v, t)
-            if bits & _REFUSED:
-                return None
-        if self._hold is not None:
-            self._hold(ints, floats)
         u, out = np.empty(self._nv), np.empty(self._size)
-        outcome = self._answer(ints, floats, t, u, out)
-        if outcome & 15 == FAILED:
+        found = self._kernel(ints, floats, q, v, t, u, out)
+        if found & LEFT:
+            if found & _REFUSED:
+                self._refuse(q, v, t)
             return None
-        return FusedCommand(u, (self._told, out, outcome, bits != 0))
+        if found & 15 == FAILED:
+            return None
+        return FusedCommand(u, (self._told, out, found & OUTCOME, found >= BITS))
 
     def _refuse(self, q: FloatArray, v: FloatArray, t: float) -> None:
         """Say what is wrong with a state; one that is at the margin may pass."""
@@ -155,12 +135,9 @@ class FusedStep:
 
     def _sample(self, t: float) -> bool:
         """Ask every path for its target at the task's own time; False where what it says is to be refused in words."""
-        store, floats, each = self._store, self._store.floats, self._store.each
-        passed = 0.0 if store.ints[at.BEGINS] else max(t - floats.item(at.BEFORE), 0.0)
+        each, times = self._store.each, self.lasting.times(t)
         for k, path, row in self._paths:
-            own = t
-            if self._waits:
-                own = t - each.item(at.DELAY, k) - (1.0 - each.item(at.SHARE, k)) * passed
+            own = times[k]
             try:
                 s = path(own)
                 rotation = s.rotation
@@ -171,58 +148,3 @@ class FusedStep:
             except Exception:  # asked again by the general way, which is the one to speak
                 return False
         return True
-
-    def times(self, t: float) -> list[float]:
-        """Each task's own time at time t."""
-        kept, store = self._store.each, self._store
-        passed = 0.0 if store.ints[at.BEGINS] else max(t - store.floats.item(at.BEFORE), 0.0)
-        pairs = zip(kept[at.DELAY].tolist(), kept[at.SHARE].tolist(), strict=True)
-        return [t - delay - (1.0 - share) * passed for delay, share in pairs]
-
-    @property
-    def step_times(self) -> list[float] | None:
-        """Each task's own time at the last step, None before the first one."""
-        return None if self._store.ints[at.BEGINS] else self._store.each[at.MADE].tolist()
-
-    @property
-    def memory(self) -> Memory:
-        """What lasts, for the general way to go on from."""
-        store, each, nv = self._store, self._store.each, self._nv
-        s, p, begun = store.store, len(self.tasks), not store.ints[at.BEGINS]
-        anchors: list[Any] | None = None
-        if begun:
-            poses = s.twelve[2 * nv + p : 2 * nv + 2 * p].copy()
-            found = store.high[at.FOUND].copy()
-            anchors = [
-                task.holding(pose[9:], pose[:9].reshape(3, 3)) if isinstance(task, FrameTask) else found[a:b]
-                for task, pose, a, b in zip(self.tasks, poses, store.first[:-1], store.first[1:], strict=True)
-            ]
-        last = store.floats.item(at.BEFORE) if begun and self._waits else None
-        kept = s.bent[p * (nv + 1) :].reshape(p, nv + 1)
-        bent = [row[:nv].copy() if row[nv] else None for row in kept]
-        started = store.floats.item(at.BEGAN) if begun else None
-        return Memory(
-            anchors, started, self.step_times or [], each[at.DELAY].tolist(), each[at.SHARE].tolist(), last, bent
-        )
-
-    def resume(self, memory: Memory) -> None:
-        """Go on from where the general way has come to."""
-        store, each, nv = self._store, self._store.each, self._nv
-        s, p = store.store, len(self.tasks)
-        at.forgotten(s)
-        each[at.DELAY], each[at.SHARE] = memory.delays, memory.shares
-        store.floats[at.BEFORE] = 0.0 if memory.last is None else memory.last
-        if memory.anchors is not None:
-            store.ints[at.BEGINS] = 0
-            store.floats[at.BEGAN] = memory.started
-            each[at.MADE] = memory.times
-            for k, anchor in enumerate(memory.anchors):
-                if isinstance(self.tasks[k], FrameTask):
-                    row = s.twelve[2 * nv + p + k]
-                    row[9:], row[:9] = anchor.position, anchor.rotation.ravel()
-                else:
-                    store.high[at.FOUND, store.first[k] : store.first[k + 1]] = anchor
-        both = s.bent.reshape(2, p, nv + 1)
-        for k, motion in enumerate(memory.bent):
-            if motion is not None:
-                both[:, k, :nv], both[:, k, nv] = motion, 1.0

@@ -10,39 +10,38 @@ import numpy as np
 
 from cartctl.checks import FloatArray, IntArray
 from cartctl.compiled import store_kernel as at
-from cartctl.compiled.answer_kernel import DLS, FAILED, RECOVERING, SNS, by_dls, by_ranks, by_sns, made
-from cartctl.compiled.hold_kernel import held_back
-from cartctl.compiled.look_kernel import ASTRAY, REFUSED, looked
+from cartctl.compiled.answer_kernel import DLS, FAILED, RECOVERING, SNS, made
 from cartctl.compiled.look_kernel import RECOVERING as _RECOVERING
+from cartctl.compiled.look_kernel import looked
 from cartctl.compiled.motion_kernel import integrate
 from cartctl.compiled.path_table import follow
+from cartctl.compiled.step_kernel import BITS, LEFT, step_dls, step_ranks, step_sns
 from cartctl.compiled.store_kernel import Store, chain_in, forgotten, opened, own_times
 from cartctl.kernels import kernel, lean_part
 
-TASKS, ROWS, HELD, SOLVER, STEPS = at.TASKS, at.ROWS, at.HELD, at.SOLVER, at.STEPS
+TASKS, ROWS, SOLVER, STEPS = at.TASKS, at.ROWS, at.SOLVER, at.STEPS
 PATH, OWN, SCALE, ERROR, U, DT, START, SAMPLE = at.PATH, at.OWN, at.SCALE, at.ERROR, at.U, at.DT, at.START, at.SAMPLE
 
 
 @lean_part
-def _answered(s: Store, ints: IntArray, floats: FloatArray, t: float, bits: int) -> int:
-    """The status of a step whose references are filled; u is in the store."""
-    if bits & (ASTRAY | REFUSED) != 0:
+def _stepped(s: Store, ints: IntArray, floats: FloatArray, q: FloatArray, v: FloatArray, t: float) -> int:
+    """The status of a step whose paths are sampled; u is in the store."""
+    nothing = s.head[:0]
+    if ints[SOLVER] == SNS:
+        found = step_sns(ints, floats, q, v, t, nothing, nothing)
+    elif ints[SOLVER] == DLS:
+        found = step_dls(ints, floats, q, v, t, nothing, nothing)
+    else:
+        found = step_ranks(ints, floats, q, v, t, nothing, nothing)
+    if found & LEFT != 0:
         for j in range(s.wide.shape[1]):
             s.wide[U, j] = 0.0
-        for p in range(s.ints[TASKS]):
+        for p in range(ints[TASKS]):
             s.each[SCALE, p] = 1.0
         made(s, t)
         return FAILED
-    if s.ints[HELD] != 0:
-        held_back(ints, floats)
-    if s.ints[SOLVER] == SNS:
-        outcome = by_sns(ints, floats, t, s.head[:0], s.head[:0])
-    elif s.ints[SOLVER] == DLS:
-        outcome = by_dls(ints, floats, t, s.head[:0], s.head[:0])
-    else:
-        outcome = by_ranks(ints, floats, t, s.head[:0], s.head[:0])
-    status = outcome & 15
-    return RECOVERING if bits & _RECOVERING != 0 and status != FAILED else status
+    status = found & 15
+    return RECOVERING if found & (BITS * _RECOVERING) != 0 and status != FAILED else status
 
 
 @lean_part
@@ -85,7 +84,11 @@ def _roll_one(
             if table >= 0:
                 sample = s.samples[SAMPLE * i : SAMPLE * (i + 1)]
                 cursor[i] = follow(nodes[begin[table] : begin[table + 1]], cursor[i], s.each[OWN, i], sample)
-        bits = looked(ints, floats, q, v, t)
+        status = FAILED
+        if k == steps:
+            looked(ints, floats, q, v, t)
+        else:
+            status = _stepped(s, ints, floats, q, v, t)
         if q_all.shape[0] > 0:
             for i in range(nq):
                 q_all[at_ + k, i] = q[i]
@@ -97,7 +100,6 @@ def _roll_one(
                 step_all[at_ + k, 1 + p + i] = s.each[OWN, i]
         if k == steps:
             break
-        status = _answered(s, ints, floats, t, bits)
         counts[status] += 1.0
         for i in range(p):
             least[i] = min(least[i], s.each[SCALE, i]) if s.each[SCALE, i] == s.each[SCALE, i] else 0.0

@@ -83,6 +83,11 @@ class Confining:
         if self._approach is not None:
             self._approach.reset()
 
+    def prepare(self) -> None:
+        """Compile ahead what the first step would otherwise wait for."""
+        if self._approach is not None:
+            self._approach.prepare()
+
     def bends(self, tasks: Sequence[Task]) -> list[FloatArray | None]:
         """How the arm was bent before, by task."""
         return [None] * len(tasks) if self._approach is None else self._approach.bends(tasks)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import warnings
 from collections.abc import Callable, Sequence
 from typing import Any, ClassVar
 
@@ -13,13 +12,11 @@ from cartctl import checks
 from cartctl.algebra.problem import Problem
 from cartctl.algebra.solution import Solution, Status
 from cartctl.checks import LARGEST, FloatArray, is_moderate
-from cartctl.compiled.fused_step import FusedStep, Memory
+from cartctl.compiled.fused_step import FusedStep
+from cartctl.compiled.lasting import Memory
 from cartctl.constraints import Constraint
 from cartctl.errors import (
-    CartctlWarning,
-    NoTasksError,
     ParameterError,
-    ProblemError,
     UnsupportedJoint,
     UnsupportedProblem,
 )
@@ -39,9 +36,10 @@ from cartctl.motion.clock import PathClocks
 from cartctl.motion.confining import Confining
 from cartctl.motion.extremal_start import onto_extremal_set
 from cartctl.motion.fallback import slowed, within_reach
+from cartctl.motion.given import checked_objective, checked_switches, checked_tasks, clocked, warn_of_unstable_gains
 from cartctl.motion.limiting import ROBOT_LIMITS, RobotLimits, usable_limits
 from cartctl.objectives.base import Objective
-from cartctl.solvers import Solver, get_solver, solvers_that_honour
+from cartctl.solvers import Solver, get_solver
 from cartctl.solvers.sns import SNS
 from cartctl.tasks.base import Task
 
@@ -95,21 +93,21 @@ class Controller:
         if not isinstance(robot, Robot):
             raise ParameterError(f"robot is a {type(robot).__name__}; expected a Robot from cc.load(...)")
         self.robot = robot
-        self.tasks = _checked_tasks(tasks, robot)
+        self.tasks = checked_tasks(tasks, robot)
         self.solver = get_solver(solver)
         self.level = get_level(level)
         self.level.check(self.solver)
         self.level.check_robot(robot)
-        _checked_switches(path_clock=path_clock, approach=approach)
+        checked_switches(path_clock=path_clock, approach=approach)
         self._limits = usable_limits(limits, robot, self.solver, self.level)
         self._guard = Guard(singularity, self.level, robot, self.tasks)
-        self.objective = self._guard.objective(_checked_objective(objective, self.solver, robot))
+        self.objective = self._guard.objective(checked_objective(objective, self.solver, robot))
         if self.objective is not objective:
-            _checked_objective(self.objective, self.solver, robot, "another singularity policy")
+            checked_objective(self.objective, self.solver, robot, "another singularity policy")
         self.metric = metric
         self._extend = getattr(self.solver, "gain", None) if self.solver.extends else None
         self.dt = checks.duration("dt", dt)
-        _warn_of_unstable_gains(self.tasks, self.dt, self.level.stable_below)
+        warn_of_unstable_gains(self.tasks, self.dt, self.level.stable_below)
         self.soft_start = checks.number("soft_start", soft_start, low=0.0)
         self._metric = as_state_metric(metric, robot.nv, self.level.metrics)
         self._weighing = metric if isinstance(metric, str) else "identity" if metric is None else ""
@@ -117,9 +115,9 @@ class Controller:
         self.solver.prepare()
         self._fused = self._fused_way()
         self._constraints, self._disabled, self._jerk, self._approach = constraints, disabled, jerk, approach
-        clocked = _clocked(path_clock, self.tasks, self.solver.scales or self._guard.waits, self.level)
-        self._clocks = PathClocks(clocked)
-        self._waiting = [task for task, waits in zip(self.tasks, clocked, strict=True) if waits]
+        waiting = clocked(path_clock, self.tasks, self.solver.scales or self._guard.waits, self.level)
+        self._clocks = PathClocks(waiting)
+        self._waiting = [task for task, waits in zip(self.tasks, waiting, strict=True) if waits]
         self._confining = self._confined_by(self._limits)
         self._last: Solution | None = None
         self._step_times: list[float] = []
@@ -129,6 +127,8 @@ class Controller:
         self._anchors: list[Any] | None = None
         self._started: float | None = None
         self._stroke = self._at_one_stroke()
+        if self._stroke is None:
+            self._confining.prepare()
         self._ahead = False  # whether what lasts is with the stroke, and what is here is out of date
 
     def reset(self) -> None:
@@ -153,6 +153,8 @@ class Controller:
         self._fall_back()
         self._confining, self._limits = confining, limits
         self._stroke = self._at_one_stroke()
+        if self._stroke is None:
+            confining.prepare()
 
     def compiled_limits(self) -> tuple[FloatArray | None, FloatArray | None, list[bool]]:
         """What a compiled loop needs to know of the limits: (11, nv), (3, nv) of the approach, and whose paths wait.
@@ -191,14 +193,14 @@ class Controller:
     def _hand_over(self, stroke: FusedStep) -> None:
         """Let that way go on from where the general one has come to."""
         lasting = (*self._clocks.kept, self._confining.bends(self.tasks))
-        stroke.resume(Memory(self._anchors, self._started, self._step_times, *lasting))
+        stroke.lasting.resume(Memory(self._anchors, self._started, self._step_times, *lasting))
         self._ahead = True
 
     def _fall_back(self) -> None:
         """Take what lasts back from the stroke."""
         if not self._ahead or self._stroke is None:
             return
-        memory = self._stroke.memory
+        memory = self._stroke.lasting.memory
         self._ahead = False
         self._anchors, self._started, self._last = memory.anchors, memory.started, None
         if memory.anchors is not None:
@@ -209,12 +211,12 @@ class Controller:
     @property
     def step_times(self) -> list[float]:
         """Each task's own time at the last step."""
-        times = self._stroke.step_times if self._ahead and self._stroke is not None else None
+        times = self._stroke.lasting.step_times if self._ahead and self._stroke is not None else None
         return self._step_times if times is None else times
 
     def times(self, t: float) -> list[float]:
         """Each task's own time when everybody else's is t: later by what its path has waited."""
-        return self._stroke.times(t) if self._ahead and self._stroke is not None else self._clocks.times(t)
+        return self._stroke.lasting.times(t) if self._ahead and self._stroke is not None else self._clocks.times(t)
 
     def start(self, q0: FloatArray) -> FloatArray:
         """Where a rollout from q0 (nq,) begins: q0, or for a solver that keeps an objective extremal, on that set.
@@ -381,74 +383,10 @@ class Controller:
     @property
     def anchors(self) -> list[Any]:
         """What each task holds on to since the first step."""
-        anchors = self._stroke.memory.anchors if self._ahead and self._stroke is not None else self._anchors
+        anchors = self._stroke.lasting.anchors if self._ahead and self._stroke is not None else self._anchors
         return [None] * len(self.tasks) if anchors is None else anchors
 
 
 def _skipped(solution: Solution) -> bool:
     """Whether a task has no feasible scale; of few numbers, a loop knows sooner than an array."""
     return any(s != s for s in solution.scales.tolist())
-
-
-def _checked_tasks(tasks: Task | Sequence[Task], robot: Robot) -> tuple[Task, ...]:
-    if isinstance(tasks, Task):
-        tasks = (tasks,)
-    if not isinstance(tasks, Sequence):
-        raise ProblemError(f"tasks is a {type(tasks).__name__}; expected a Task or a sequence of tasks")
-    if not tasks:
-        raise NoTasksError("tasks is empty; expected at least one Task, such as cc.FrameTask(robot.tool)")
-    for k, task in enumerate(tasks):
-        if not isinstance(task, Task):
-            raise ProblemError(f"tasks[{k}] is a {type(task).__name__}; expected a Task")
-        task.check(robot)
-    return tuple(tasks)
-
-
-def _checked_switches(**switches: Any) -> None:
-    for name, value in switches.items():
-        if not (isinstance(value, bool) or (value is None and name == "path_clock")):
-            raise ParameterError(f"{name} is {value!r}; expected True or False")
-
-
-def _clocked(asked: bool | None, tasks: Sequence[Task], slowed: bool, level: Level) -> list[bool]:
-    """Which tasks have a path that waits: by default every one, where commands are slowed and the level can."""
-    if asked and not level.clocked:
-        raise UnsupportedProblem(f"level {level.name!r} has no path clock; use level 'velocity', or path_clock=False")
-    waits = level.clocked and (slowed if asked is None else asked)
-    return [bool(waits) for _ in tasks]
-
-
-def _checked_objective(
-    objective: Objective | None, solver: Solver, robot: Robot, otherwise: str = "objective=None"
-) -> Objective | None:
-    if objective is None:
-        if solver.extends:
-            raise ProblemError(
-                f"solver {solver.name!r} has no objective to keep extremal; give one, as cc.JointRange()"
-            )
-        return None
-    if not isinstance(objective, Objective):
-        raise ParameterError(
-            f"objective is a {type(objective).__name__}; expected an Objective such as cc.JointRange()"
-        )
-    checks.number(f"the gain of {type(objective).__name__}", objective.gain, low=0.0)
-    if "reference" not in solver.honours and not solver.extends:
-        able = ", ".join(repr(s) for s in solvers_that_honour("reference"))
-        raise UnsupportedProblem(
-            f"solver {solver.name!r} has no null-space term for an objective; use {able}, or {otherwise}"
-        )
-    objective.check(robot)
-    return objective
-
-
-def _warn_of_unstable_gains(tasks: Sequence[Task], dt: float, limit: float) -> None:
-    """A sampled error shrinks by (1 - k dt) a step: above k dt = 2 it grows, with two integrators above 1."""
-    for task in tasks:
-        gain = float(np.max(task.gain, initial=0.0))
-        if gain * dt >= limit:
-            warnings.warn(
-                f"task {task.name!r}: gain {gain:g} 1/s times dt {dt:g} s is {gain * dt:.3g}; the loop is unstable "
-                f"from {limit:g} on; use a gain below {0.5 * limit / dt:g}, or a smaller dt",
-                CartctlWarning,
-                stacklevel=3,
-            )
