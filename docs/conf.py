@@ -20,6 +20,7 @@ extensions = [
     "sphinx.ext.autodoc",
     "results",
     "methods",
+    "notebooks",
     "reference",
     "offline_math",
 ]
