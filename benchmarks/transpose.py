@@ -3,10 +3,10 @@
     python benchmarks/transpose.py            # print the table
     python benchmarks/transpose.py --save     # and write results/transpose.csv
 
-circle: radius 0.1 m (planar arms 0.3), 4 s, loop gain 20/s at 1 ms, without limits; rms_mm of the hand, peak joint rate.
-point: whole steps q <- q + u for b the error, from ten random starts about home to where the hand is at home; median of
-the steps until 1 mm (and 1 mrad where a pose is asked), and how many were there within 1000. us: one solve of the same
-problem.
+circle: radius 0.1 m (planar arms 0.3), 4 s, loop gain 20/s at 1 ms, no limits; rms_mm of the hand, peak joint rate.
+point: whole steps q <- q + u for b the error, from ten random starts about home to where the hand is at home; median
+of the steps until 1 mm (and 1 mrad where a pose is asked), and how many were there within 1000. us: one solve of the
+same problem.
 """
 
 from __future__ import annotations

@@ -68,7 +68,10 @@ def facts(name: str) -> list[tuple[str, str]]:
     return [
         ("In code", f'`solver="{name}"`, or {{py:class}}`cc.{public} <cartctl.{public}>`'),
         ("Levels", ", ".join(levels(name))),
-        ("Several tasks", {"stacked": "as one stack of rows, by weight", "ranked": "ranked strictly"}[row["several tasks"]]),
+        (
+            "Several tasks",
+            {"stacked": "as one stack of rows, by weight", "ranked": "ranked strictly"}[row["several tasks"]],
+        ),
         ("Honours", ", ".join(honours) or "nothing but equations"),
         ("Parameters", ", ".join(default) or "none"),
         *([("Near singularities", "any inverse policy, `policy=`")] if hasattr(solver, "policy") else []),

@@ -1,4 +1,4 @@
-"""The directive ``notebooks``: the notebooks of the repository with their titles and first sentences, if there are any."""
+"""The directive ``notebooks``: those of the repository with their titles and first sentences, if there are any."""
 
 from __future__ import annotations
 
@@ -33,7 +33,9 @@ class Notebooks(SphinxDirective):
         for notebook in found:
             self.env.note_dependency(str(notebook))
             title, words = about(notebook)
-            text = nodes.paragraph("", "", nodes.strong(text=title), nodes.Text(" "), nodes.literal(text=f"notebooks/{notebook.name}"))
+            text = nodes.paragraph(
+                "", "", nodes.strong(text=title), nodes.Text(" "), nodes.literal(text=f"notebooks/{notebook.name}")
+            )
             items += nodes.list_item("", text, *([nodes.paragraph(text=words)] if words else []))
         return [items]
 
