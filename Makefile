@@ -49,7 +49,7 @@ soak: $(READY)  ## random problems and closed loops for MINUTES on all cores, ev
 	@$(BIN)/python benchmarks/soak.py --minutes $(MINUTES)
 
 docs: $(READY)  ## the documentation site, build/site/index.html; warnings are errors, nothing is downloaded
-	@$(BIN)/python -m sphinx -q -b html -W --keep-going docs build/site
+	@$(BIN)/python -m sphinx -q -E -b html -W --keep-going docs build/site
 	@echo build/site/index.html
 
 clean:  ## remove the environment, caches and output

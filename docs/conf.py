@@ -45,6 +45,7 @@ myst_dmath_double_inline = False
 autodoc_member_order = "bysource"
 autodoc_typehints = "signature"
 autodoc_preserve_defaults = True
+autodoc_type_aliases = {"FloatArray": "FloatArray", "Array": "Array"}
 python_use_unqualified_type_names = True
 python_maximum_signature_line_length = 90
 default_role = "code"

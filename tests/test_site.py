@@ -7,6 +7,7 @@ import os
 import re
 import subprocess
 import sys
+import time
 import warnings
 from html.parser import HTMLParser
 from pathlib import Path
@@ -32,13 +33,26 @@ def paths(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture(scope="module")
 def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Built as `make docs` builds it."""
-    out = tmp_path_factory.mktemp("site")
-    done = subprocess.run(
-        [sys.executable, "-m", "sphinx", "-q", "-E", "-b", "html", "-W", "--keep-going", str(DOCS), str(out)],
-        capture_output=True, text=True, check=False, cwd=ROOT, env=os.environ | {"PYTHONPATH": str(ROOT)},
-    )  # fmt: skip
-    assert done.returncode == 0, done.stderr[-4000:]
+    """Built once as `make docs` builds it, whatever the number of processes the tests run in."""
+    base = tmp_path_factory.getbasetemp()
+    base = base.parent if "PYTEST_XDIST_WORKER" in os.environ else base
+    out, said = base / "site", base / "site.log"
+    try:
+        (base / "site.begun").mkdir()
+    except FileExistsError:  # another process builds it
+        deadline = time.monotonic() + 300.0
+        while not said.exists():
+            assert time.monotonic() < deadline, "the process that builds the site does not come to an end"
+            time.sleep(0.2)
+    else:
+        done = subprocess.run(
+            [sys.executable, "-m", "sphinx", "-q", "-E", "-b", "html", "-W", "--keep-going", str(DOCS), str(out)],
+            capture_output=True, text=True, check=False, cwd=ROOT, env=os.environ | {"PYTHONPATH": str(ROOT)},
+        )  # fmt: skip
+        (base / "site.part").write_text(f"{done.returncode}\n{done.stderr}", encoding="utf-8")
+        (base / "site.part").rename(said)
+    code, _, errors = said.read_text(encoding="utf-8").partition("\n")
+    assert code == "0", errors[-4000:]
     return out
 
 

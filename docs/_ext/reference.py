@@ -131,9 +131,15 @@ def plain(app: Sphinx, what: str, name: str, obj: Any, options: Any, lines: list
     lines[:] = prose(lines)
 
 
+def hide(app: Sphinx, what: str, name: str, obj: Any, skip: bool, options: Any) -> bool | None:
+    """Classes that are attributes of others, such as the kind of bounds of a level, are nobody's business."""
+    return True if what == "class" and inspect.isclass(obj) else None
+
+
 def setup(app: Sphinx) -> dict[str, bool]:
     """Register the handlers."""
     app.connect("builder-inited", write_pages)
     app.connect("source-read", link_names)
     app.connect("autodoc-process-docstring", plain)
+    app.connect("autodoc-skip-member", hide)
     return {"parallel_read_safe": True, "parallel_write_safe": True}
