@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 from docutils import nodes
+from docutils.statemachine import StringList
 from sphinx.application import Sphinx
 from sphinx.util.docutils import SphinxDirective
 
@@ -13,12 +15,15 @@ FOLDER = Path(__file__).parents[2] / "notebooks"
 
 
 def about(notebook: Path) -> tuple[str, str]:
-    """The first heading of a notebook, and the first line of prose below it."""
+    """The first heading of a notebook, and the first sentence of prose below it, as Markdown."""
     cells = json.loads(notebook.read_text(encoding="utf-8"))["cells"]
-    lines = [line.strip() for c in cells if c["cell_type"] == "markdown" for line in "".join(c["source"]).splitlines()]
-    heads = [line.lstrip("# ") for line in lines if line.startswith("#")]
-    words = [line for line in lines if line and not line.startswith(("#", "$", "|", "!"))]
-    return (heads or [notebook.stem])[0], (words or [""])[0]
+    text = "\n\n".join("".join(cell["source"]) for cell in cells if cell["cell_type"] == "markdown")
+    text = re.sub(r"\$\$.*?\$\$", "", text, flags=re.DOTALL)
+    heads = re.findall(r"^#+ (.*)$", text, re.MULTILINE)
+    paragraphs = [" ".join(part.split()) for part in re.split(r"\n\s*\n", text)]
+    words = [part for part in paragraphs if part and part[0] not in "#|!-*<"]
+    sentence = re.match(r"(.*?[.?!:])(?: |$)", words[0]) if words else None
+    return (heads or [notebook.stem])[0], sentence[1].replace("*", "").rstrip(":") if sentence else ""
 
 
 class Notebooks(SphinxDirective):
@@ -29,15 +34,14 @@ class Notebooks(SphinxDirective):
         found = sorted(FOLDER.glob("*.ipynb"))
         if not found:
             return [nodes.paragraph(text="This copy of the repository has none.")]
-        items = nodes.bullet_list()
+        lines = []
         for notebook in found:
             self.env.note_dependency(str(notebook))
             title, words = about(notebook)
-            text = nodes.paragraph(
-                "", "", nodes.strong(text=title), nodes.Text(" "), nodes.literal(text=f"notebooks/{notebook.name}")
-            )
-            items += nodes.list_item("", text, *([nodes.paragraph(text=words)] if words else []))
-        return [items]
+            lines += [f"- **{title}** `notebooks/{notebook.name}`  ", f"  {words}"]
+        box = nodes.Element()
+        self.state.nested_parse(StringList(lines, source=self.get_source_info()[0]), 0, box)
+        return box.children
 
 
 def setup(app: Sphinx) -> dict[str, bool]:
