@@ -13,7 +13,7 @@ from cartctl.cli.console import Debug, verb
 def cite(
     solvers: Annotated[
         list[str] | None,
-        typer.Argument(metavar="[SOLVER]...", help="Names of solvers; cartctl itself if none is given."),
+        typer.Argument(metavar="SOLVER", help="Names of solvers; cartctl itself if none is given."),
     ] = None,
     debug: Debug = False,
 ) -> None:
