@@ -53,4 +53,4 @@ docs: $(READY)  ## the documentation site, build/site/index.html; warnings are e
 	@echo build/site/index.html
 
 clean:  ## remove the environment, caches and output
-	rm -rf $(VENV) out .pytest_cache .mypy_cache .ruff_cache .hypothesis build dist
+	rm -rf $(VENV) out .pytest_cache .mypy_cache .ruff_cache .hypothesis build dist docs/reference

@@ -100,3 +100,34 @@ def test_the_number_of_robots_is_right() -> None:
     import cartctl as cc
 
     assert f"lists {len(cc.robots())} by name" in (ROOT / "README.md").read_text()
+
+
+def shell_lines() -> list[tuple[str, str]]:
+    """Every line that a page tells a reader to type into a shell, without its comment."""
+    found = []
+    for page in PAGES:
+        text = (ROOT / page).read_text()
+        lines = [line for block in re.findall(r"```sh\n(.*?)```", text, re.DOTALL) for line in block.splitlines()]
+        lines += re.findall(r"`((?:cartctl|python) [^`]+)`", text)
+        found += [(page, line.partition("#")[0].strip()) for line in lines if line.startswith(("cartctl", "python"))]
+    return sorted(set(found))
+
+
+@pytest.mark.parametrize(("page", "line"), shell_lines())
+def test_what_a_page_says_to_type_exists(page: str, line: str) -> None:
+    """Verbs and their options are those of the command line, scripts are files."""
+    import typer
+
+    from cartctl.cli.app import app
+
+    words = line.partition(">>")[0].split()
+    if words[0] == "python":
+        assert (ROOT / words[1]).is_file()
+        return
+    command = typer.main.get_command(app)
+    while len(words) > 1 and words[1] in getattr(command, "commands", {}):
+        command, words = command.commands[words[1]], words[1:]
+    assert not getattr(command, "commands", None) or len(words) == 1 or words[1].isupper(), f"no verb {words[1:2]}"
+    options = {name for parameter in command.params for name in (*parameter.opts, *parameter.secondary_opts)}
+    unknown = [word for word in words[1:] if word.startswith("--") and word not in {*options, "--help"}]
+    assert not unknown
