@@ -4,11 +4,11 @@
 # $$ \min_\tau \tfrac12\, \tau^T W \tau \quad\text{subject to}\quad J M^{-1} \tau = c, \qquad
 # c = \ddot r - \dot J v + J M^{-1} h $$
 #
-# A redundant arm has infinitely many torques that accelerate its hand alike; a norm chooses. **Which norm, and why can the
-# least torque at every instant be a disaster in the long run?**
+# A redundant arm has infinitely many torques that accelerate its hand alike; a norm chooses.
+# **Which norm, and why can the least torque at every instant be a disaster in the long run?**
 #
-# $M$ is the inertia matrix, $h$ the Coriolis, centrifugal and gravity torques, $\ddot r$ the commanded acceleration of the
-# hand. Three norms are classical, each with a closed form:
+# $M$ is the inertia matrix, $h$ the Coriolis, centrifugal and gravity torques, $\ddot r$ the
+# commanded acceleration of the hand. Three norms are classical, each with a closed form:
 #
 # | least | $W$ | $\tau$ |
 # |---|---|---|
@@ -30,9 +30,10 @@ NORMS = {"identity": "$I$", "inverse-inertia": "$M^{-1}$", "inverse-inertia-squa
 # %% [markdown]
 # ## The first formula is not the third
 #
-# A. De Luca, *Robotics 2*, Sapienza, exam of 15 June 2010: an RP arm with $M = \mathrm{diag}(m_{11}, m_{22})$ controls the
-# height of its tip only, $J = [(d_2 + q_2) \cos q_1,\; \sin q_1]$. The exam's $(J M^{-1})^{\#}$ differs from $M J^{\#}$, unless
-# $M$ is a multiple of the identity:
+# A. De Luca, *Robotics 2*, Sapienza, exam of 15 June 2010: an RP arm with
+# $M = \mathrm{diag}(m_{11}, m_{22})$ controls the height of its tip only,
+# $J = [(d_2 + q_2) \cos q_1,\; \sin q_1]$. The exam's $(J M^{-1})^{\#}$ differs from
+# $M J^{\#}$, unless $M$ is a multiple of the identity:
 
 # %%
 m, d2, (q1, q2) = np.array([0.402, 1.7]), 0.3, (0.7, 0.4)
@@ -40,18 +41,25 @@ J = np.array([[(d2 + q2) * np.cos(q1), np.sin(q1)]])
 A = J / m  # J M^-1
 least = {
     name: cc.solve(cc.Problem([(A, [1.0])], metric=W), "pinv").u
-    for name, W in (("identity", None), ("inverse-inertia", 1.0 / m), ("inverse-inertia-squared", 1.0 / m**2))
+    for name, W in (
+        ("identity", None),
+        ("inverse-inertia", 1.0 / m),
+        ("inverse-inertia-squared", 1.0 / m**2),
+    )
 }
 for name, tau in least.items():
     print(f"W = {NORMS[name]:10s} tau = {tau.round(4)}, norm {np.linalg.norm(tau):.4f}")
-assert np.allclose(least["identity"], [0.6946177196468347, 0.19764496682114327])  # the exam's formula at this point
+assert np.allclose(
+    least["identity"], [0.6946177196468347, 0.19764496682114327]
+)  # the exam's formula at this point
 assert np.allclose(least["inverse-inertia-squared"], m * np.linalg.lstsq(J, [1.0])[0])
 assert not np.allclose(least["identity"], least["inverse-inertia-squared"], rtol=0.1)
 
 # %% [markdown]
 # ## One instant of a 4R arm
 #
-# The same with a full inertia matrix, and the closed forms of the table. Each answer is the smallest in its own norm.
+# The same with a full inertia matrix, and the closed forms of the table. Each answer is the
+# smallest in its own norm.
 
 # %%
 arm = cc.planar([0.5, 0.5, 0.5, 0.5])  # 0.5 kg each, in a horizontal plane: no gravity in the way
@@ -60,8 +68,15 @@ state = arm.state(q0)
 J, M = state.jacobian("tool")[:2], state.mass_matrix
 c = np.array([-1.0, -1.0])  # m/s^2, from rest: h = 0, J_dot v = 0
 inverse = np.linalg.solve(M, np.eye(4))
-weights = {"identity": np.eye(4), "inverse-inertia": inverse, "inverse-inertia-squared": inverse @ inverse}
-tau = {name: cc.solve(cc.Problem([(J @ inverse, c)], metric=W), "pinv").u for name, W in weights.items()}
+weights = {
+    "identity": np.eye(4),
+    "inverse-inertia": inverse,
+    "inverse-inertia-squared": inverse @ inverse,
+}
+tau = {
+    name: cc.solve(cc.Problem([(J @ inverse, c)], metric=W), "pinv").u
+    for name, W in weights.items()
+}
 
 assert np.allclose(tau["inverse-inertia"], J.T @ np.linalg.solve(J @ inverse @ J.T, c))
 assert np.allclose(tau["inverse-inertia-squared"], M @ J.T @ np.linalg.solve(J @ J.T, c))
@@ -73,8 +88,9 @@ for name, W in weights.items():
 # %% [markdown]
 # ## A short motion and a long one
 #
-# The tip follows a line for 1 s, or a circle lap after lap for 8 s, and nothing else is asked of the arm: $u_0 = 0$, the
-# classical form. A motion that runs away ends its simulation, with a warning that we expect here and silence.
+# The tip follows a line for 1 s, or a circle lap after lap for 8 s, and nothing else is asked of
+# the arm: $u_0 = 0$, the classical form. A motion that runs away ends its simulation, with a
+# warning that we expect here and silence.
 
 
 # %%
@@ -86,7 +102,9 @@ laps = cc.Circle.starting_at(start, radius=0.3, period=2.0, laps=4)
 def motion(norm, path, damping):
     tip = cc.FrameTask("tool", "xy", gain=20.0, target=path)
     level = cc.TorqueLevel(damping)
-    controller = cc.Controller(arm, tip, "projected-gradient", level, limits=None, metric=norm, dt=2e-3)
+    controller = cc.Controller(
+        arm, tip, "projected-gradient", level, limits=None, metric=norm, dt=2e-3
+    )
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", cc.CartctlWarning)
         return cc.simulate(controller, q0, path.duration, integrator="rk4")
@@ -96,29 +114,36 @@ short = {norm: motion(norm, line, damping=0.0) for norm in NORMS}
 long = {norm: motion(norm, laps, damping=0.0) for norm in NORMS}
 effort = {norm: run.metrics().torque_effort for norm, run in short.items()}
 for norm, run in long.items():
-    print(f"{NORMS[norm]:10s} short: {effort[norm]:.2f} N^2 m^2 s;  long: beyond 1,000 N m:", abs(run.torque).max() > 1e3)
+    print(
+        f"{NORMS[norm]:10s} short: {effort[norm]:.2f} N^2 m^2 s;  long: beyond 1,000 N m:",
+        abs(run.torque).max() > 1e3,
+    )
 
 assert effort["identity"] < 0.5 * min(effort["inverse-inertia"], effort["inverse-inertia-squared"])
 assert all(abs(run.torque).max() > 1e3 for run in long.values())  # N m
 assert long["identity"].interrupted  # it ran away, and before the others
-assert long["identity"].time[-1] < min(long["inverse-inertia"].time[-1], long["inverse-inertia-squared"].time[-1])
+assert long["identity"].time[-1] < min(
+    long["inverse-inertia"].time[-1], long["inverse-inertia-squared"].time[-1]
+)
 
 # %% [markdown]
-# On the short motion the least torque is what its name says, by more than a factor of two. On the long one it is the first
-# to run away: what is least *now* may leave the joints spinning in the null space, and those speeds must be paid for later
-# (Hollerbach & Suh 1987). Nothing in the equation sees them. The other norms only last longer.
+# On the short motion the least torque is what its name says, by more than a factor of two. On the
+# long one it is the first to run away: what is least *now* may leave the joints spinning in the
+# null space, and those speeds must be paid for later (Hollerbach & Suh 1987). Nothing in the
+# equation sees them. The other norms only last longer.
 #
 # ## The remedy: damp what the hand does not feel
 #
-# A reference for the torques that brakes, $u_0 = h - D v$ (with $M$ before $D$ in the other two norms), projected into the
-# null space. The hand's motion stays the same.
+# A reference for the torques that brakes, $u_0 = h - D v$ (with $M$ before $D$ in the other
+# two norms), projected into the null space. The hand's motion stays the same.
 
 # %%
 damped = {norm: motion(norm, laps, damping=None) for norm in NORMS}  # None: the default D
 for norm, run in damped.items():
     peak, speed = abs(run.torque).max(), abs(run.v).max()
     rms = 1e3 * run.metrics().tasks[0].rms_m
-    print(f"{NORMS[norm]:10s} peak {peak:4.1f} N m, joints up to {speed:.1f} rad/s, hand within {rms:.2f} mm (RMS)")
+    print(f"{NORMS[norm]:10s} peak {peak:4.1f} N m, joints up to {speed:.1f} rad/s", end=", ")
+    print(f"hand within {rms:.2f} mm (RMS)")
     assert peak < 50.0 and rms < 0.2 and not run.interrupted
 
 # %%
