@@ -47,9 +47,13 @@ def execute(book: NotebookNode, timeout: float = 300.0) -> NotebookNode:
     with TemporaryDirectory() as folder:  # for the kernel's sockets: files, not ports
         config = Config(AsyncKernelManager={"transport": "ipc", "ip": str(Path(folder) / "kernel")})
         here = {"metadata": {"path": str(HERE)}}
-        client = NotebookClient(book, timeout=timeout, record_timing=False, resources=here, config=config)
+        client = NotebookClient(
+            book, timeout=timeout, record_timing=False, resources=here, config=config
+        )
         client.execute(env=env)
-    book.metadata.language_info = NotebookNode(name="python")  # no version: it differs from machine to machine
+    book.metadata.language_info = NotebookNode(
+        name="python"
+    )  # no version: it differs from machine to machine
     return book
 
 

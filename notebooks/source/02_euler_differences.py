@@ -110,7 +110,7 @@ def by_axis_angle(R, Rd):
     return spatial.log3(Rd @ R.T)
 
 
-def arrives(law, R, Rd, dt=0.04, duration=4.0):
+def arrives(law, R, Rd, dt=0.05, duration=4.0):
     """Whether it gets within 3 degrees."""
     for _ in range(int(duration / dt)):
         R = spatial.exp3(k * dt * law(R, Rd)) @ R
@@ -123,7 +123,7 @@ def anywhere(rng, tilt):
     return spatial.exp3(tilt * axis / np.linalg.norm(axis))
 
 
-tilts, pairs = np.radians([15, 45, 75, 105, 135, 165]), 25
+tilts, pairs = np.radians([15, 45, 75, 105, 135, 165]), 20
 share = {"angle-axis": [], "Euler difference": []}
 for law, name in ((by_axis_angle, "angle-axis"), (by_difference, "Euler difference")):
     for tilt in tilts:

@@ -33,7 +33,8 @@ state = cc.planar([1.0, 1.0, 1.0]).state(np.radians([45.0, 0.0, 45.0]))
 J = state.jacobian("tool")
 direction, tip = (J[5:], [0.0]), (J[:2], [2.0, -1.0])
 verdict = analysis.algorithmic_singularity(J[5:], J[:2])
-print(verdict)
+assert verdict.occurs and not analysis.kinematic_singularity(J[:2])
+print(verdict.reason)
 
 stacked = cc.solve(cc.Problem([direction, tip]), "pinv")
 ranked = cc.solve(cc.Problem([direction, tip]), "task-priority")
@@ -146,7 +147,7 @@ for name in ("stacked, damped", "ranked, damped"):
     a.plot(*points.T, "o-", color=colors[name], lw=5, ms=9)
 a.plot(*circle(run.time[k]).position[:2], "*", color="k", ms=20, zorder=5)
 a.plot(*elbow[:2], "x", color="k", ms=14, mew=4, zorder=5)
-a.text(elbow[0], elbow[1] - 0.22, "elbow's place", ha="center")
+a.text(elbow[0], elbow[1] - 0.45, "elbow's place", ha="center")
 a.text(circle(run.time[k]).position[0], start[1] + 0.12, "target", ha="center")
 a.set(
     aspect="equal",
