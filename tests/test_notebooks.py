@@ -96,12 +96,12 @@ def test_it_runs_and_says_what_the_committed_one_says(source):
     assert {o.output_type for o in outputs(done)} == {"stream", "display_data"}
     assert {o.name for o in outputs(done) if o.output_type == "stream"} == {"stdout"}  # no warning, nothing on stderr
     now, then = printed(done), printed(made)
-    assert NUMBER.sub("#", now) == NUMBER.sub("#", then)
+    assert re.findall(r"[^\W\d]+", NUMBER.sub(" ", now)) == re.findall(r"[^\W\d]+", NUMBER.sub(" ", then))
     np.testing.assert_allclose(
         [float(x) for x in NUMBER.findall(now)], [float(x) for x in NUMBER.findall(then)], rtol=0.02, atol=2e-3
     )
     (figure,), (kept,) = figures(done), figures(made)
-    assert np.abs(seen(figure) - seen(kept)).mean() < 5.0  # of 255
+    assert np.abs(seen(figure) - seen(kept)).mean() < 3.0  # of 255
 
 
 def test_the_readme_has_a_line_for_each():
