@@ -91,8 +91,7 @@ def test_nothing_in_it_belongs_to_one_machine(source):
 @every_source
 def test_it_runs_and_says_what_the_committed_one_says(source):
     book, made = build.read(source), nbformat.read(build.made_from(source), as_version=4)
-    book.cells.insert(0, nbformat.v4.new_code_cell(NO_NETWORK, id="no-network"))
-    done = build.execute(book)
+    done = build.execute(book, startup=build.QUIET + NO_NETWORK)
     assert {o.output_type for o in outputs(done)} == {"stream", "display_data"}
     assert {o.name for o in outputs(done) if o.output_type == "stream"} == {"stdout"}  # no warning, nothing on stderr
     now, then = printed(done), printed(made)
