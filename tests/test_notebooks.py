@@ -8,12 +8,16 @@ import io
 import re
 from pathlib import Path
 
-import nbformat
 import numpy as np
 import pytest
 from PIL import Image
 
 from cartctl.report.palette import COLORS
+
+WHY = "the notebooks' tools: pip install -e '.[dev]'"
+nbformat = pytest.importorskip("nbformat", reason=WHY)
+for tool in ("nbclient", "jupytext", "ipykernel"):
+    pytest.importorskip(tool, reason=WHY)
 
 ROOT = Path(__file__).parent.parent
 FOLDER = ROOT / "notebooks"
