@@ -56,4 +56,4 @@ notebooks: $(READY)  ## execute the notebooks: their .ipynb from notebooks/sourc
 	@OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python notebooks/build.py
 
 clean:  ## remove the environment, caches and output
-	rm -rf $(VENV) out .pytest_cache .mypy_cache .ruff_cache .hypothesis build dist docs/reference
+	rm -rf $(VENV) out .pytest_cache .mypy_cache .ruff_cache .hypothesis build dist docs/reference docs/lectures

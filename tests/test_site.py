@@ -122,6 +122,17 @@ def test_every_public_name_has_its_place_in_the_reference(pages: dict[Path, Page
     assert not missing
 
 
+def test_every_notebook_is_a_page_with_its_outputs(site: Path) -> None:
+    listed = (site / "notebooks.html").read_text(encoding="utf-8")
+    for notebook in sorted((ROOT / "notebooks").glob("*.ipynb")):
+        text = (site / "lectures" / f"{notebook.stem}.html").read_text(encoding="utf-8")
+        cells = json.loads(notebook.read_text(encoding="utf-8"))["cells"]
+        drawn = sum("image/png" in output.get("data", {}) for cell in cells for output in cell.get("outputs", []))
+        assert len(re.findall(rf'src="[^"]*{notebook.stem}-\d+\.png"', text)) == drawn
+        assert text.count("highlight-python") == sum(cell["cell_type"] == "code" for cell in cells)
+        assert f'href="lectures/{notebook.stem}.html"' in listed
+
+
 @pytest.mark.parametrize("name", cc.solvers())
 def test_a_method_has_its_page(name: str) -> None:
     text = (DOCS / "methods" / f"{name}.md").read_text(encoding="utf-8")

@@ -6,6 +6,7 @@ page, by the converter that docutils brings, and a formula it cannot read is a w
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
 from docutils import nodes
@@ -18,8 +19,9 @@ _LOG = logging.getLogger(__name__)
 
 
 def _markup(node: nodes.Element, block: bool) -> str:
+    formula = re.sub(r"(?<![{])°", r"\\text{°}", node.astext())  # the one character of ours that the converter lacks
     try:
-        return tex2mathml(node.astext(), as_block=block)
+        return tex2mathml(formula, as_block=block)
     except MathError as error:
         _LOG.warning("formula %r: %s", node.astext(), error, location=node)
         return f"<code>{node.astext()}</code>"
