@@ -9,6 +9,7 @@ import typer
 from cartctl import __version__
 from cartctl.cli.bench import app as bench
 from cartctl.cli.calibrate import calibrate
+from cartctl.cli.cite import cite
 from cartctl.cli.compare import compare
 from cartctl.cli.doctor import doctor
 from cartctl.cli.info import info
@@ -61,4 +62,5 @@ app.command(
     "Example:  cartctl plan lwr --objective joint-speed --path polygon --samples 300"
 )(plan)
 app.command(epilog="Example:  cartctl info panda")(info)
+app.command(epilog="Example:  cartctl cite sns >> paper.bib")(cite)
 app.command(epilog="Example:  cartctl doctor")(doctor)

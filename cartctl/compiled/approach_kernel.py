@@ -219,9 +219,14 @@ def _left_out(
         if lower.shape[0] > 0:
             still = joints[_STILL, j]
             out = (wanted[j] > 0.0 and upper[j] <= still) or (wanted[j] < 0.0 and lower[j] >= -still)
-        found = found or out
-        for i in range(m):
-            room.A[i, j] = 0.0 if out else J[i, j]
+        if out and not found:
+            found = True
+            for i in range(m):
+                for k in range(n):
+                    room.A[i, k] = J[i, k]
+        if out:
+            for i in range(m):
+                room.A[i, j] = 0.0
     return found
 
 

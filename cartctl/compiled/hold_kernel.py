@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from math import inf, sqrt
 
-from cartctl.checks import FloatArray, IntArray
+from cartctl.checks import FloatArray
 from cartctl.compiled import store_kernel as at
 from cartctl.compiled.approach_kernel import approached, calmed
 from cartctl.compiled.plan_kernel import FRAME, Task
@@ -12,11 +12,10 @@ from cartctl.compiled.store_kernel import (
     Store,
     chain_in,
     index_in,
-    opened,
     room_in,
     straightened,
 )
-from cartctl.kernels import kernel, lean_part
+from cartctl.kernels import lean_part
 
 NV, TASKS, LARGEST, COUNT, BOUNDED = at.NV, at.TASKS, at.LARGEST, at.COUNT, at.BOUNDED
 A, JOINTS, LOWER, UPPER, UNIT, ERROR, RATE, BEND, B = (
@@ -53,10 +52,9 @@ def _task(s: Store, p: int, first: int, last: int) -> Task:
     return Task(kind, index_in(s).joint[p], waits, pose, index_in(s).dof[first:last], s.high[UNIT, first:last])
 
 
-@kernel("void(out_int_store, out_store)", fast=True, alone=True, lean=True)
-def held_back(ints: IntArray, floats: FloatArray) -> None:
+@lean_part
+def hold_back(s: Store) -> None:
     """Hold every task's command back where the robot could not stop, highest priority first."""
-    s = opened(ints, floats)
     n, count, r = s.ints[NV], s.ints[TASKS], s.ints[LARGEST]
     if s.ints[COUNT] % _STRAIGHT == 0:
         straightened(s)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import isfinite, pi, sqrt
 
 from cartctl.checks import LARGEST as FAR
-from cartctl.checks import FloatArray, IntArray
+from cartctl.checks import FloatArray
 from cartctl.compiled import store_kernel as at
 from cartctl.compiled.curve_kernel import curve_sample
 from cartctl.compiled.motion_kernel import (
@@ -17,8 +17,8 @@ from cartctl.compiled.motion_kernel import (
     place_frame,
 )
 from cartctl.compiled.plan_kernel import FRAME
-from cartctl.compiled.store_kernel import Store, chain_in, index_in, opened, own_times
-from cartctl.kernels import kernel, lean_part
+from cartctl.compiled.store_kernel import Store, chain_in, index_in, own_times
+from cartctl.kernels import lean_part
 from cartctl.levels.velocity_kernel import velocity_bounds
 
 REFUSED, ASTRAY, RECOVERING = 1, 2, 4  # bits of what looking may come to
@@ -106,13 +106,12 @@ def _frame(s: Store, p: int, first: int, last: int) -> None:
         s.each[NATURAL, p] = sqrt(total)
 
 
-@kernel("int(out_int_store, out_store, vector, vector, float)", fast=True, alone=True, lean=True)
-def looked(ints: IntArray, floats: FloatArray, q: FloatArray, v: FloatArray, t: float) -> int:
+@lean_part
+def look(s: Store, q: FloatArray, v: FloatArray, t: float) -> int:
     """Fill the store with what the state q (nq,), v (nv,) at time t asks: RECOVERING, or why it cannot be answered.
 
     Paths have been sampled at the tasks' own times.
     """
-    s = opened(ints, floats)
     if not _sound(s, q, v, t):
         return REFUSED
     n, first = s.ints[NV], index_in(s).first

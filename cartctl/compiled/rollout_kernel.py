@@ -12,14 +12,13 @@ from cartctl.checks import FloatArray, IntArray
 from cartctl.compiled import store_kernel as at
 from cartctl.compiled.answer_kernel import DLS, FAILED, RECOVERING, SNS, made
 from cartctl.compiled.look_kernel import RECOVERING as _RECOVERING
-from cartctl.compiled.look_kernel import looked
 from cartctl.compiled.motion_kernel import integrate
 from cartctl.compiled.path_table import follow
 from cartctl.compiled.step_kernel import BITS, LEFT, step_dls, step_ranks, step_sns
 from cartctl.compiled.store_kernel import Store, chain_in, forgotten, opened, own_times
 from cartctl.kernels import kernel, lean_part
 
-TASKS, ROWS, SOLVER, STEPS = at.TASKS, at.ROWS, at.SOLVER, at.STEPS
+TASKS, ROWS, SOLVER, STEPS, LOOKS = at.TASKS, at.ROWS, at.SOLVER, at.STEPS, at.LOOKS
 PATH, OWN, SCALE, ERROR, U, DT, START, SAMPLE = at.PATH, at.OWN, at.SCALE, at.ERROR, at.U, at.DT, at.START, at.SAMPLE
 
 
@@ -84,11 +83,8 @@ def _roll_one(
             if table >= 0:
                 sample = s.samples[SAMPLE * i : SAMPLE * (i + 1)]
                 cursor[i] = follow(nodes[begin[table] : begin[table + 1]], cursor[i], s.each[OWN, i], sample)
-        status = FAILED
-        if k == steps:
-            looked(ints, floats, q, v, t)
-        else:
-            status = _stepped(s, ints, floats, q, v, t)
+        ints[LOOKS] = 1 if k == steps else 0
+        status = _stepped(s, ints, floats, q, v, t)
         if q_all.shape[0] > 0:
             for i in range(nq):
                 q_all[at_ + k, i] = q[i]

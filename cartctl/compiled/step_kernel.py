@@ -5,14 +5,14 @@ from __future__ import annotations
 from cartctl.checks import FloatArray, IntArray
 from cartctl.compiled import store_kernel as at
 from cartctl.compiled.answer_kernel import FAILED, by_ranks, exact, least_squares, made, told
-from cartctl.compiled.hold_kernel import held_back
-from cartctl.compiled.look_kernel import ASTRAY, REFUSED, looked
+from cartctl.compiled.hold_kernel import hold_back
+from cartctl.compiled.look_kernel import ASTRAY, REFUSED, look
 from cartctl.compiled.store_kernel import Store, index_in, opened
 from cartctl.kernels import kernel, lean_part
 
 OUTCOME, BITS = 63, 64  # what a step returns: its status and the bits beside that, and times BITS those of looking
 LEFT = BITS * (REFUSED | ASTRAY)
-TASKS, HELD, SCALE, AGAIN = at.TASKS, at.HELD, at.SCALE, at.AGAIN
+TASKS, HELD, LOOKS, SCALE, AGAIN = at.TASKS, at.HELD, at.LOOKS, at.SCALE, at.AGAIN
 
 
 @lean_part
@@ -31,7 +31,7 @@ def _ended(s: Store, t: float, bits: int, outcome: int, u: FloatArray, out: Floa
     return BITS * bits + outcome
 
 
-@kernel("int(out_int_store, out_store, vector, vector, float, out_store, out_store)", fast=True, alone=True, lean=True)
+@kernel("int(out_int_store, out_store, vector, vector, float, out_store, out_store)", fast=True, lean=True)
 def step_sns(
     ints: IntArray, floats: FloatArray, q: FloatArray, v: FloatArray, t: float, u: FloatArray, out: FloatArray
 ) -> int:
@@ -40,37 +40,37 @@ def step_sns(
     Paths have been sampled at the tasks' own times. u (nv,) and out, room for a copy of the step
     (:func:`cartctl.compiled.answer_kernel.told_size`), may both be empty: u is then taken from the store.
     """
-    bits = looked(ints, floats, q, v, t)
-    if BITS * bits & LEFT:
-        return BITS * bits
     s = opened(ints, floats)
+    bits = look(s, q, v, t)
+    if BITS * bits & LEFT or ints[LOOKS] != 0:
+        return BITS * bits
     if ints[HELD] != 0:
-        held_back(ints, floats)
+        hold_back(s)
     _begun(s)
     return _ended(s, t, bits, exact(s), u, out)
 
 
-@kernel("int(out_int_store, out_store, vector, vector, float, out_store, out_store)", fast=True, alone=True, lean=True)
+@kernel("int(out_int_store, out_store, vector, vector, float, out_store, out_store)", fast=True, lean=True)
 def step_dls(
     ints: IntArray, floats: FloatArray, q: FloatArray, v: FloatArray, t: float, u: FloatArray, out: FloatArray
 ) -> int:
     """The same by damped least squares, which knows no bounds to be held back for."""
-    bits = looked(ints, floats, q, v, t)
-    if BITS * bits & LEFT:
-        return BITS * bits
     s = opened(ints, floats)
+    bits = look(s, q, v, t)
+    if BITS * bits & LEFT or ints[LOOKS] != 0:
+        return BITS * bits
     _begun(s)
     return _ended(s, t, bits, least_squares(s, index_in(s).first), u, out)
 
 
-@kernel("int(out_int_store, out_store, vector, vector, float, out_store, out_store)", fast=True, alone=True, lean=True)
+@kernel("int(out_int_store, out_store, vector, vector, float, out_store, out_store)", fast=True, lean=True)
 def step_ranks(
     ints: IntArray, floats: FloatArray, q: FloatArray, v: FloatArray, t: float, u: FloatArray, out: FloatArray
 ) -> int:
     """The same by task priority."""
-    bits = looked(ints, floats, q, v, t)
-    if BITS * bits & LEFT:
-        return BITS * bits
     s = opened(ints, floats)
+    bits = look(s, q, v, t)
+    if BITS * bits & LEFT or ints[LOOKS] != 0:
+        return BITS * bits
     _begun(s)
     return _ended(s, t, bits, by_ranks(s), u, out)

@@ -16,7 +16,7 @@ from cartctl.levels.approach_kernel import ROWS as DIRECTION_ROWS
 
 # the integers' head
 NQ, NV, TASKS, ROWS, LARGEST, BOUNDED, HELD, LAST, BEGINS, COUNT, SOLVER, STEPS = 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11
-INTS_HEAD = 12
+LOOKS, INTS_HEAD = 12, 13  # LOOKS: that it is looked, and nothing more
 # the numbers' head: six of room at its end
 DT, PARAMETER, BEFORE, START, BEGAN, SIX, HEAD = 0, 1, 2, 3, 4, 5, 11
 
