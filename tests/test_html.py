@@ -272,9 +272,9 @@ def test_browser_draws_the_robot_and_moves_it(planar_page: Path) -> None:
 @needs_chromium
 @pytest.mark.chromium
 def test_browser_plays_by_itself(planar_page: Path) -> None:
-    first, second = (shoot(planar_page, "", ms, (480, 360)) for ms in (250, 600))
+    first, second = (shoot(planar_page, "", ms, (1000, 400)) for ms in (250, 600))
     assert not first.console and not second.console
-    assert difference(first, second, slice(110, 290)) > 0.01
+    assert difference(first, second, slice(20, 320), slice(0, 560)) > 0.01
 
 
 @needs_chromium
