@@ -101,6 +101,11 @@ def test_a_target_out_of_reach_is_stood_before(controller: cc.Controller, level:
     run(session, 8.0)
     assert np.linalg.norm(session.command.references[0].error) > 0.5  # type: ignore[union-attr]
     assert np.abs(session.v).max() < 1e-3 and session.trouble == ""
+    reading = Reading.of(session.controller, session.q, session.v, session.command)  # type: ignore[arg-type]
+    assert reading.stands and "cannot be reached" in status_html(reading, 100.0, 1.0, [])
+    controller.tasks[0].target = moved(controller, [-0.1, 0.0, 0.0])
+    run(session, 0.1)
+    assert not Reading.of(session.controller, session.q, session.v, session.command).stands  # type: ignore[arg-type]
 
 
 def test_what_runs_away_rests_and_goes_on_when_asked_for_less(controller: cc.Controller) -> None:
@@ -436,7 +441,7 @@ def test_playing_leaves_the_tasks_as_they_were(controller: cc.Controller, monkey
 def visited(controller: cc.Controller) -> Iterator[tuple[Any, Any, Tab]]:
     """The viewer and a browser, which is closed first."""
     with shown(controller) as (show, window):
-        with browser((960, 600)) as tab:
+        with browser((1120, 640)) as tab:
             yield show, window, tab
         wait(lambda: window.deserted)
 
@@ -454,7 +459,7 @@ def test_a_browser_shows_the_robot_and_drags_it(controller: cc.Controller, monke
         tab.until("document.body.innerText.includes('OPTIMAL')")
         wait(lambda: share(tab.picture(), BLUE, 60) > 0.001)  # two of its links
         before, start, low = tab.picture(), show.session.q, moved(controller, [0.0, 0.0, -0.05]).translation[2]
-        arrow = on_screen(show, show.scene.target(0).translation + [0.0, 0.0, 0.2 * show.scene.size], (960, 600))
+        arrow = on_screen(show, show.scene.target(0).translation + [0.0, 0.0, 0.2 * show.scene.size], (1120, 640))
         for _ in range(5):  # a handle that is not drawn yet does not hear the mouse
             tab.drag(arrow, (arrow[0], arrow[1] + 90.0))
             time.sleep(1.0)
@@ -464,7 +469,7 @@ def test_a_browser_shows_the_robot_and_drags_it(controller: cc.Controller, monke
         assert wanted[2] < low, "the handle did not move"
         wait(lambda: np.linalg.norm(controller.robot.state(show.session.q).position("tip") - wanted) < 1e-4)
         assert np.abs(show.session.q - start).max() > 0.05
-        wait(lambda: difference(before, tab.picture(), columns=slice(0, 600)) > 0.005)
+        wait(lambda: difference(before, tab.picture(), columns=slice(0, 740)) > 0.005)
         after = tab.picture()
         assert {url.split("/")[2] for url in after.requests} == {window.url.split("/")[2]}
         assert not [line for line in after.console if "deprecated" not in line]

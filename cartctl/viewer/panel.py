@@ -29,6 +29,7 @@ class Panel:
         gui.configure_theme(show_logo=False, show_share_button=False, control_width="medium", brand_color=(0, 114, 178))
         self.status = gui.add_html("")
         self.trouble = gui.add_html("")
+        gui.add_button_group("", ("pause", "target to hand", "home")).on_click(self._click)
         solvers = list(dict.fromkeys([controller.solver.name, *usable_solvers()]))
         with gui.add_folder("method"):
             self._solver = gui.add_dropdown("solver", solvers, initial_value=controller.solver.name)
@@ -48,8 +49,6 @@ class Panel:
             self.trace = gui.add_checkbox("trace of the hand", True)
             self.ellipsoid = gui.add_checkbox("velocity ellipsoid", False, hint="what unit joint speeds reach")
         gui.add_html(f'<div style="font-size:11.5px;line-height:1.4;opacity:.65;padding:2px 10px 6px">{_HINT}</div>')
-        self._buttons = gui.add_button_group("", ("pause", "target to hand", "home"))
-        self._buttons.on_click(self._click)
 
     @property
     def method(self) -> Method:

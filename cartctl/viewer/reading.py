@@ -13,6 +13,8 @@ from cartctl.levels import Command
 from cartctl.model.robot import Robot
 from cartctl.motion.controller import Controller
 
+_OFF, _STILL = 1e-3, 1e-3  # m or rad off the target, and rad/s or m/s, at which a robot counts as standing
+
 
 @dataclass(frozen=True)
 class Joint:
@@ -30,25 +32,32 @@ class Joint:
 
 @dataclass(frozen=True)
 class Reading:
-    """status: of the solution. scales: one a task, nan where skipped. errors: (name, m or None, rad or None) a task."""
+    """status: of the solution. scales: one a task, nan where skipped. errors: (name, m or None, rad or None) a task.
+
+    stands: whether the robot rests without having reached its target.
+    """
 
     status: Status
     scales: list[float]
     errors: list[tuple[str, float | None, float | None]]
     joints: list[Joint]
+    stands: bool = False
 
     @classmethod
     def of(cls, controller: Controller, q: FloatArray, v: FloatArray, command: Command) -> Reading:
         """What is to be read of a step that led to q, v."""
         solution = command.solution
+        errors: list[tuple[str, float | None, float | None]] = []
+        for task, reference in zip(controller.tasks, command.references, strict=False):
+            units = task.units(controller.robot)
+            errors.append((task.name, _norm(reference.error, units, "m"), _norm(reference.error, units, "rad")))
+        first = max(errors[0][1] or 0.0, errors[0][2] or 0.0)
         return cls(
             solution.status,
             [float(s) for s in solution.scales[: len(controller.tasks)]],
-            [
-                (task.name, *(_norm(r.error, task.units(controller.robot), unit) for unit in ("m", "rad")))  # type: ignore[misc]
-                for task, r in zip(controller.tasks, command.references, strict=False)
-            ],
+            errors,
             joints(controller.robot, q, v, command.torque, np.sign(solution.saturated)),
+            stands=first > _OFF and float(np.abs(v).max(initial=0.0)) < _STILL,
         )
 
 

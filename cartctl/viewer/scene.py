@@ -19,6 +19,7 @@ from cartctl.tasks import FrameTask
 
 _TRACE, _GAP = 600, 2e-3  # points of the trace, and the m between two of them
 _FOV, _ASIDE = 36.0, 0.09  # deg, vertical; shift of the view in its own distance
+_ROOM = 1.3  # times the robot at home that is in the picture at first
 _GREY = 26  # of 255: how much of a body's colours may differ without a mesh of its own
 
 
@@ -50,10 +51,8 @@ class Scene:
     def _stage(self, seen: FloatArray) -> None:
         """Floor, light and camera, as in the report."""
         floor = min(float(seen[:, 2].min()), 0.0)
-        reach = np.concatenate(
-            [seen, seen.mean(axis=0) + 0.5 * self.size * np.eye(3), seen.mean(axis=0) - 0.5 * self.size * np.eye(3)]
-        )
-        look = Stage(reach, floor).view
+        middle = 0.5 * (seen.min(axis=0) + seen.max(axis=0))
+        look = Stage(middle + _ROOM * (seen - middle), floor).view
         camera = self._server.initial_camera
         camera.fov = float(np.deg2rad(_FOV))
         right = np.cross([0.0, 0.0, 1.0], look.offset)

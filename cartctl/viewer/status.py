@@ -37,9 +37,12 @@ def trouble_html(sentence: str) -> str:
 def _verdict(reading: Reading) -> str:
     status = reading.status
     color = _GOOD if status in _QUIET else _BAD if status in _WORST else _ODD
+    name, words = status.name, status.value
+    if reading.stands and status in _QUIET:
+        name, words, color = "AT REST", "The target cannot be reached; the robot stands where it can still stop.", _ODD
     badge = f"background:{color};color:#fff;border-radius:4px;padding:1px 7px;font-weight:600"
-    words = f'<span style="opacity:.75">{escape(status.value)}</span>'
-    return f'<div style="min-height:55px"><span style="{badge}">{status.name}</span> {words}</div>'
+    explained = f'<span style="opacity:.75">{escape(words)}</span>'
+    return f'<div style="min-height:55px"><span style="{badge}">{name}</span> {explained}</div>'
 
 
 def _figures(reading: Reading, step_us: float, speed: float) -> str:
