@@ -18,7 +18,7 @@ from harness import save_rows, setting, show
 
 import cartctl as cc
 from cartctl.bench.runner import grid
-from cartctl.bench.statistics import scores, tallies
+from cartctl.bench.statistics import ranking, scores, tallies
 
 ROOT = Path(__file__).parent.parent
 SETS = ("lectures", "arms")
@@ -43,7 +43,7 @@ def run(sets: Sequence[str], out: Path) -> list[dict[str, str]]:
     cc.bench.report(results, out)
     means = {figure: scores(results, figure).means() for figure in FIGURES}
     counts = tallies(results)
-    order = sorted(counts, key=lambda name: (-counts[name].solved, means["rms_m"][name]))
+    order = ranking(results, "rms_m")
     print(f"\n{done.made} runs in {perf_counter() - begun:.0f} s; the report: {out / 'report.html'}")
     return [
         {

@@ -70,6 +70,8 @@ def show(title: str, rows: list[dict[str, str]]) -> None:
     for row in rows:
         table.add_row(*row.values())
     console = Console()
+    if not console.is_terminal:  # a table cut to the width of a pipe says nothing
+        console = Console(width=400)
     console.print(table)
     console.print(", ".join(f"{k} {v}" for k, v in setting().items()), style="dim")
 

@@ -1,36 +1,28 @@
 """Compiled kernels: plain array functions in the subset numba compiles, compiled when first used, cached on disk.
 
 A kernel stays in the file of its method, decorated with :func:`kernel`; importing it does not import numba. A large one
-is made of functions decorated with :func:`part`, which are compiled into it; it may call other kernels, too. The cache
-folder is keyed by a hash of the package's sources, because numba's own key misses changes in a callee of another file.
-With ``NUMBA_DISABLE_JIT=1`` the same functions run as Python.
+is made of functions decorated with :func:`part`, which are compiled into it; it may call other kernels, too. They are
+kept where :mod:`cartctl.kernel_cache` says. With ``NUMBA_DISABLE_JIT=1`` the same functions run as Python.
 """
 
 from __future__ import annotations
 
-import hashlib
 import logging
-import os
-import re
-import shutil
 import signal
 import sys
 import threading
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
-from functools import lru_cache
+from contextlib import contextmanager
 from pathlib import Path
 from types import FunctionType
 from typing import Any, Generic, ParamSpec, TypeVar
 
-from platformdirs import user_cache_path
+from cartctl.kernel_cache import cache_folder
 
 P = ParamSpec("P")
 R = TypeVar("R")
 
-_KEPT_CACHES = 4
 _SLOW = 1.0  # s of compiling that pass without a word
-_OURS = re.compile(r"[0-9a-f]{16}")
 _log = logging.getLogger("cartctl")
 
 # Sums may be reordered and fused, so that dot products are vectorised; nan and inf keep their meaning.
@@ -165,7 +157,7 @@ def _compile(kernel: Kernel[P, R]) -> Callable[P, R]:
     types = _numba_type(returned)(*(_numba_type(name.strip()) for name in arguments.split(",")))
     function = _with_parts(kernel.function)
     options = {"error_model": "numpy", "fastmath": _FAST if kernel.fast else False, "nogil": kernel.alone}
-    folder = cache_folder()
+    folder = cache_folder(Path(function.__code__.co_filename))
     with _told_when_slow(folder):
         return _compiled_into(folder, types, options, function)  # type: ignore[no-any-return]
 
@@ -206,40 +198,3 @@ def _tell(folder: Path | None) -> None:
         how = "anew in every process: no folder to keep it in" if folder is None else "once, then kept on disk"
         waits = sys.stderr is not None and (sys.stderr.isatty() or "ipykernel" in sys.modules)
         _log.log(logging.WARNING if waits else logging.INFO, "cartctl is compiling (%s); this takes a moment", how)
-
-
-@lru_cache(maxsize=1)
-def cache_folder() -> Path | None:
-    """Where compiled kernels are kept, or None where nothing can be written."""
-    root = Path(os.environ.get("CARTCTL_CACHE_DIR") or user_cache_path("cartctl")) / "kernels"
-    folder = root / _source_hash()
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        os.utime(folder)
-        if not os.access(folder, os.W_OK):
-            raise PermissionError(folder)
-    except OSError as error:
-        _log.info("kernels are compiled anew in every process: %s", error)
-        return None
-    _prune(root)
-    return folder
-
-
-def _source_hash() -> str:
-    digest = hashlib.sha256()
-    package = Path(__file__).parent
-    for source in sorted(package.rglob("*.py")):
-        digest.update(str(source.relative_to(package)).encode())
-        digest.update(source.read_bytes())
-    return digest.hexdigest()[:16]
-
-
-def _prune(root: Path) -> None:
-    """Remove all but the caches used last; what is not a cache of ours stays."""
-    caches = []
-    for folder in root.iterdir():
-        with suppress(OSError):
-            if _OURS.fullmatch(folder.name) and folder.is_dir() and not folder.is_symlink():
-                caches.append((folder.stat().st_mtime, folder))
-    for _, folder in sorted(caches, reverse=True)[_KEPT_CACHES:]:
-        shutil.rmtree(folder, ignore_errors=True)

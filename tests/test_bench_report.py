@@ -15,6 +15,7 @@ from cartctl.bench.contents import LIMITATIONS, contents, worst_cases
 from cartctl.bench.statistics import scores
 from cartctl.bench.table import Row, results
 from cartctl.errors import BenchError, ParameterError
+from tests import chromium
 from tests.bench_scenarios import short
 
 ODD = 'odd <b> & "name" | _x_'
@@ -82,6 +83,19 @@ def test_the_page_stands_alone(folder: Path, made: object) -> None:
             assert (folder / link).is_file(), link
     assert not re.search(r"(href|src)=.https?:", source)
     assert ODD in page.text and "<b>" not in source
+
+
+@chromium.needs_chromium
+@pytest.mark.parametrize("width", [1280, 400])
+def test_a_browser_shows_the_page(folder: Path, made: object, width: int) -> None:
+    """Not blank, nothing asked of a network, nothing complained of, on a phone too."""
+    shot = chromium.shoot(folder / "report.html", size=(width, 1600))
+    assert shot.requests == [] and shot.console == []
+    background = shot.pixels[5, 5].astype(int)
+    drawn = (abs(shot.pixels.astype(int) - background).max(axis=2) > 40).mean()
+    assert drawn > 0.02
+    coloured = (shot.pixels.max(axis=2).astype(int) - shot.pixels.min(axis=2) > 60).mean()
+    assert coloured > 1e-4  # the profiles' lines
 
 
 def test_the_report_has_every_part(folder: Path, rows: list[Row], made: object) -> None:

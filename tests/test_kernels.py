@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -11,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from cartctl import kernel_cache
 from tests import tolerances as tol
 
 # Prints what the package's kernels answer, how often numba's cache was hit, and where it lies.
@@ -74,9 +76,8 @@ def test_interpreted_and_compiled_agree(compiled, tmp_path):
 
 
 def test_the_cache_lies_where_it_is_told_to(compiled, cache):
-    folders = list((cache / "kernels").iterdir())
-    assert len(folders) == 1
-    assert list(folders[0].rglob("*.nbi")) and list(folders[0].rglob("*.nbc"))
+    for folder in (cache / "kernels").iterdir():
+        assert list(folder.rglob("*.nbi")) and list(folder.rglob("*.nbc"))
     beside = Path(compiled["own"]).parent
     assert not list(beside.rglob("*.nbi")), "compiled kernels beside the sources"
 
@@ -118,7 +119,7 @@ def test_a_cache_that_cannot_be_written(compiled, tmp_path):
 def test_old_caches_are_pruned_and_strangers_are_left_alone(compiled, tmp_path):
     """A handful is kept, the current one always; what is no cache of ours is nobody's business."""
     root = tmp_path / "kernels"
-    for k in range(8):
+    for k in range(80):
         (root / f"{k:016x}").mkdir(parents=True)
         os.utime(root / f"{k:016x}", (1000.0 + k, 1000.0 + k))
     strangers = [root / f"my_kernels_{k}" for k in range(6)]
@@ -130,8 +131,34 @@ def test_old_caches_are_pruned_and_strangers_are_left_alone(compiled, tmp_path):
     np.testing.assert_array_equal(run(CARTCTL_CACHE_DIR=str(tmp_path))["answers"], compiled["answers"])
     assert all((folder / "gauss.cl").is_file() for folder in strangers)
     left = {f.name for f in root.iterdir()} - {f.name for f in strangers} - {"dangling"}
-    assert len(left) <= 5 and f"{0:016x}" not in left
-    assert left - {f"{k:016x}" for k in range(8)}
+    assert len(left) <= 64 and f"{0:016x}" not in left
+    assert left - {f"{k:016x}" for k in range(80)}
+
+
+def test_an_edit_of_what_a_kernel_imports_is_noticed_however_far(tmp_path):
+    """A copy of the package, a far import and a stranger to the kernel edited in turn."""
+    package = Path(kernel_cache.__file__).parent
+    shutil.copytree(package, tmp_path / package.name, ignore=shutil.ignore_patterns("__pycache__", "*.toml", "*.js"))
+
+    def key() -> str:
+        code = (
+            "from pathlib import Path\nfrom cartctl import kernel_cache as k\nimport json\n"
+            "print(json.dumps(k._hash_of((Path(k.__file__).parent / 'solvers/exact/lexicographic.py',))))"
+        )
+        env = {**os.environ, "PYTHONPATH": str(tmp_path)}
+        return subprocess.run(
+            [sys.executable, "-c", code], env=env, cwd=tmp_path, capture_output=True, text=True
+        ).stdout
+
+    before = key()
+    assert before
+    for stranger in ("cli/track.py", "motion/controller.py", "paths/line.py"):
+        (tmp_path / "cartctl" / stranger).open("a").write("\n# edited\n")
+    assert key() == before
+    for near in ("solvers/exact/rows.py", "solvers/exact/kinds.py", "checks.py"):
+        (tmp_path / "cartctl" / near).open("a").write("\n# edited\n")
+        assert key() != before
+        before = key()
 
 
 def test_importing_kernels_does_not_import_numba():

@@ -2,18 +2,25 @@
 
 from __future__ import annotations
 
-import hashlib
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
-from cartctl import kernels
+from cartctl import kernel_cache, kernels
 from cartctl.kernels import kernel
 from soaking.judge import AT, FINE, GREY, WHAT, judged
 from soaking.problems import make
 
 MOST = 64  # failures of a batch that are kept
+_SOURCES = (
+    "draws",
+    "matrices",
+    "bounds",
+    "problems",
+    "judge",
+    "batch",
+)  # of the kernel
 
 
 class Failure(NamedTuple):
@@ -58,15 +65,9 @@ def _run(seed, first, last, spoilt, worst, counts, failures):
 
 def prepare() -> None:
     """Compile, or fetch from the cache, which is one for these files and this engine."""
-    if kernels.cache_folder() is None or hasattr(_run, "_compiled"):
-        _ = _run.compiled
-        return
-    digest = hashlib.sha256()
-    for name in ("draws", "matrices", "bounds", "problems", "judge", "batch"):
-        digest.update(Path(__file__).with_name(f"{name}.py").read_bytes())
+    folder = kernel_cache.cache_folder(*(Path(__file__).with_name(f"{name}.py") for name in _SOURCES))
     usual = kernels.cache_folder
-    folder = usual() / f"soak-{digest.hexdigest()[:16]}"
-    kernels.cache_folder = lambda: folder
+    kernels.cache_folder = lambda *_: folder
     try:
         _ = _run.compiled
     finally:

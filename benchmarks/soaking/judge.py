@@ -6,13 +6,14 @@ import numpy as np
 
 from cartctl.kernels import part
 from cartctl.solvers.exact.disguise import Given
-from cartctl.solvers.exact.kinds import CONTRADICTORY, FITTED, INTERVAL, SCALED, STUCK
+from cartctl.solvers.exact.kinds import CONTRADICTORY, FITTED, INTERVAL, SCALED, STUCK, UNPROVEN
 from cartctl.solvers.exact.lexicographic import lexicographic, residuals_of
 
 _solve = part(lexicographic.function)
 
 # What is counted.
-LEVELS_FULL, LEVELS_SCALED, LEVELS_SKIPPED, LEVELS_FITTED, LEVELS_INTERVAL, CONTRADICTIONS, COARSE, GREY, AT = range(9)
+LEVELS_FULL, LEVELS_SCALED, LEVELS_SKIPPED, LEVELS_FITTED, LEVELS_INTERVAL = range(5)
+CONTRADICTIONS, COARSE, GREY, TOLD, AT = range(5, 10)
 # What is a failure.
 FINE, NOT_A_NUMBER, OUTSIDE, NOT_A_SCALE, STUCK_AT, PRIMAL, DUAL, GAP = range(8)
 WHAT = ("", "nan", "outside bounds", "no scale", "stuck", "primal", "dual", "gap")
@@ -63,13 +64,19 @@ def judged(made, n, spoilt, worst, counts):
     if made.guess[0] > 0:
         u, scales, again = solved(m, n, made.guess, none)
         flags |= again
-    if flags & (STUCK | CONTRADICTORY):
+    if flags & CONTRADICTORY:
         return STUCK_AT, float(flags)
+    if flags & STUCK:  # status FAILED, with nothing to follow
+        counts[TOLD] += 1
+        return FINE, 0.0
     if spoilt:
         u[0] += 1e-3 * (np.abs(u).max() + 1e-3)
     failure, size = _plausible(m, u, scales, counts)
     if failure != FINE:
         return failure, size
+    if flags & UNPROVEN:
+        counts[TOLD] += 1
+        return FINE, 0.0
     return _proven(m, u, scales, proofs, worst, counts)
 
 

@@ -122,6 +122,8 @@ class Loop:
         return ""
 
     def _proven(self, solution: cc.Solution) -> str:
+        if solution.outcome is cc.Status.UNPROVEN:  # it says so itself
+            return ""
         try:
             certificate = solution.certificate()
         except UnsupportedProblem:

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from soaking.batch import Batch, Failure
-from soaking.judge import AT, COARSE, CONTRADICTIONS, GREY
+from soaking.judge import AT, COARSE, CONTRADICTIONS, GREY, TOLD
 from soaking.loops import Loops
 
 _CLAIMS = ("met", "scaled", "skipped", "fitted", "interval")
@@ -68,6 +68,7 @@ class Tally:
             "worst_gap": gap,
             "above_1e-8": str(self.counts[COARSE]),
             "grey_unproven": str(self.counts[GREY]),
+            "told_unproven": str(self.counts[TOLD]),
             "steps": str(self.steps),
             "steps_per_s": self._rate(self.steps, "loops", jobs),
             "statuses": " ".join(f"{name} {count}" for name, count in sorted(self.statuses.items())),

@@ -48,6 +48,10 @@ class Status(Enum):
         "A task lost rank here: motion in the lost directions is left out, damped or slowed; "
         "move away from the singularity or drop an axis."
     )
+    UNPROVEN = (
+        "Commands are so nearly dependent that double precision cannot prove this answer optimal; u keeps the bounds, "
+        "and certificate() says how far from proven it is."
+    )
     FAILED = "The numbers over- or underflowed; u was set to zero. Check the scale of the matrices."
 
     def __str__(self) -> str:

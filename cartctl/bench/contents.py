@@ -9,7 +9,7 @@ from itertools import groupby
 from typing import Any, NamedTuple
 
 from cartctl.bench.schema import BY_NAME
-from cartctl.bench.statistics import PENALTY, Row, Tally, cell_of, present, scores, tallies
+from cartctl.bench.statistics import PENALTY, Row, Tally, cell_of, present, ranking, scores, tallies
 from cartctl.report.numbers import number
 
 SUMMED = ("rms_m", "rms_rad", "effort", "jerk_rms", "step_p50")
@@ -158,9 +158,7 @@ def _overview(rows: Sequence[Row]) -> Section:
     figures = [name for name in SUMMED if any(row["valid"] and row[name] is not None for row in there)]
     means = {name: scores(there, name).means() for name in figures}
     counts = tallies(there)
-    order = sorted(
-        counts, key=lambda name: (-counts[name].solved, -counts[name].valid, means[figures[0]][name] if figures else 0)
-    )
+    order = ranking(there, figures[0] if figures else None)
     table = Table(
         ["method", "runs", "done", "valid", "solved", *(HEADS[name] for name in figures)],
         [[Cell(name), *_counted(counts[name]), *(_mean(means[f], name) for f in figures)] for name in order],

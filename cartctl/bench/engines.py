@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 import signal
+import threading
 from collections.abc import Callable, Iterable, Iterator
 from itertools import chain, islice
 from typing import Any
@@ -71,10 +72,25 @@ def processes(workers: int) -> Engine:
                         f"worker processes died {deaths} times without a result, at work on {at}; all finished runs "
                         "are kept. Leave the culprit out, or run with --workers 1 to see how it dies"
                     ) from None
+            except (GeneratorExit, KeyboardInterrupt):
+                _hush_loky()
+                raise
             finally:
                 made.close()
 
     return engine
+
+
+def _hush_loky() -> None:
+    """A pool that is cut short may have its table emptied under its own thread, which then dies with a traceback."""
+    usual = threading.excepthook
+
+    def hook(what: threading.ExceptHookArgs) -> None:
+        if what.exc_type is KeyError and what.thread is not None and what.thread.name == "ExecutorManagerThread":
+            return
+        usual(what)
+
+    threading.excepthook = hook
 
 
 def cluster(address: str) -> Engine:

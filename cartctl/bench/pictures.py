@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cartctl.bench.schema import BY_NAME, FIGURES
-from cartctl.bench.statistics import Row, present, scores
+from cartctl.bench.statistics import Row, present, ranking, scores
 from cartctl.errors import ParameterError
 from cartctl.files import whole_file
 from cartctl.report.palette import pen
@@ -36,7 +36,7 @@ def profiles(rows: Sequence[Row], figures: Sequence[str] = SHOWN) -> Figure:
             raise ParameterError(f"figure {name!r} is not one of {', '.join(FIGURES)}")
     columns = min(2, len(figures))
     high = -(-len(figures) // columns)
-    names = list(dict.fromkeys(str(row["solver"]) for row in present(rows)))
+    names = ranking(present(rows), figures[0])  # the best have the clearest pens
     room = 0.35 + 0.21 * -(-len(names) // 4)  # inches below, for the legend
     size = (5.6 * columns, 3.3 * high + room)
     drawing = Figure(figsize=size)

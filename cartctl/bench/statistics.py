@@ -98,6 +98,13 @@ class Tally:
     solved: int
 
 
+def ranking(rows: Sequence[Row], figure: str | None) -> list[str]:
+    """Methods by how many runs they solved, then how many are valid, then their mean of the figure."""
+    counts = tallies(rows)
+    means = {} if figure is None else scores(rows, figure).means()
+    return sorted(counts, key=lambda name: (-counts[name].solved, -counts[name].valid, means.get(name, 0.0)))
+
+
 def tallies(rows: Sequence[Row]) -> dict[str, Tally]:
     """By method."""
     names = dict.fromkeys(str(row["solver"]) for row in rows)

@@ -8,6 +8,7 @@ import re
 import shutil
 from collections.abc import Callable, Iterator
 from importlib import metadata
+from pathlib import Path
 from typing import NamedTuple
 
 from cartctl import __version__
@@ -130,9 +131,9 @@ def _kernels() -> Finding:
 
 
 def _cache() -> Finding:
-    from cartctl.kernels import cache_folder
+    from cartctl.kernel_cache import cache_folder
 
-    folder = cache_folder()
+    folder = cache_folder(Path(__file__))
     if folder:
         return Finding("ok", "kernel cache", str(folder.parent))
     trouble = "not writable, so every process compiles anew"

@@ -6,21 +6,18 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from cartctl import checks
 from cartctl.checks import FloatArray
 from cartctl.constraints.base import Constraint, Rows
-from cartctl.constraints.clearance_kernel import MOST_ERROR, REST, clearance_rows
+from cartctl.constraints.clearance_kernel import MOST_ERROR, REST, clearance_rows, mean_rates
 from cartctl.constraints.curvature import joint_order
-from cartctl.constraints.intervals import Box, spread
+from cartctl.constraints.intervals import Box
 from cartctl.model.robot import Robot
 from cartctl.model.scene import AroundItself, AroundScene, Arrangement, Scene, excluded
 from cartctl.model.state import State
 
 _NEAR = 0.03  # m beyond the margin: where joints can stop within a step, what is farther need not be slowed yet
-_SLOW = 0.1  # rad/s or m/s: so slow, the curvature of a motion counts as an error
-_ANY_RATE = 10.0  # rad/s or m/s: a joint whose speed nothing limits, where it is asked what is near
 
 
 class Closest(NamedTuple):
@@ -50,12 +47,12 @@ class ClearanceConstraint(Constraint):
         self.deceleration = checks.number("deceleration", deceleration, low=0.0, strict=True)
         self.recovery_speed = checks.number("recovery_speed", recovery_speed, low=0.0, strict=True)
         self.name = name
-        self._order: tuple[Robot, FloatArray] | None = None
+        self._robot: tuple[Robot, FloatArray, bool] | None = None
 
     def check(self, robot: Robot) -> None:
         """Whatever the scene hangs on must exist; raises FrameNotFound, ParameterError."""
         self.arrangement(robot)
-        clearance_rows.compiled  # noqa: B018 - compiles now, not at the first step
+        _ = clearance_rows.compiled, mean_rates.compiled  # they compile now, not at the first step
 
     def excess(self, state: State) -> float:
         """Margin less the smallest distance, m."""
@@ -74,18 +71,19 @@ class ClearanceConstraint(Constraint):
     def velocity_rows(self, state: State, dt: float, box: Box | None = None) -> Rows:
         """``n^T (J_a - J_b) v >= n . v_obstacle - y(d - margin)``, and what a step bends."""
         limits = state.robot.limits
-        centre, radius = spread(box, limits.velocity_lower, limits.velocity_upper, state.v)
-        unknown = _unknown(box, limits.velocity_lower, limits.velocity_upper)
-        abrupt = box is None or not np.isfinite([limits.acceleration_lower, limits.acceleration_upper]).all()
-        rates = _around(centre, radius, unknown, state.v)
-        return self._rows(state, dt, rates, 0.0, _NEAR if abrupt else np.inf)
+        low, high = (limits.velocity_lower, limits.velocity_upper) if box is None else (box.lower, box.upper)
+        rates, nothing = np.empty((4, len(state.v))), np.zeros(len(state.v))
+        own = (limits.velocity_lower, limits.velocity_upper)
+        mean_rates.compiled(low, high, *own, state.v, nothing, state.v, 1.0, rates)
+        return self._rows(state, dt, rates, 0.0, _NEAR if box is None or not self._gradual(state.robot) else np.inf)
 
     def acceleration_rows(self, state: State, dt: float, box: Box | None = None) -> Rows:
         """The same for the mean rate of a step, ``w = v + a dt/2``, m/s^2."""
-        limits, still = state.robot.limits, np.zeros(state.robot.nv)
-        centre, radius = spread(box, limits.acceleration_lower, limits.acceleration_upper, still)
-        unknown = _unknown(box, limits.acceleration_lower, limits.acceleration_upper)
-        rates = _around(state.v + 0.5 * dt * centre, 0.5 * dt * radius, unknown, state.v)
+        limits = state.robot.limits
+        own = (limits.acceleration_lower, limits.acceleration_upper)
+        low, high = own if box is None else (box.lower, box.upper)
+        rates, nothing = np.empty((4, len(state.v))), np.zeros(len(state.v))
+        mean_rates.compiled(low, high, *own, nothing, state.v, state.v, 0.5 * dt, rates)
         return self._rows(state, dt, rates, 1.0, np.inf)
 
     def _rows(self, state: State, dt: float, rates: FloatArray, level: float, near: float) -> Rows:
@@ -126,9 +124,18 @@ class ClearanceConstraint(Constraint):
             most = count
 
     def _ordered(self, robot: Robot) -> FloatArray:
-        if self._order is None or self._order[0] is not robot:
-            self._order = (robot, joint_order(robot))
-        return self._order[1]
+        return self._known_of(robot)[1]
+
+    def _gradual(self, robot: Robot) -> bool:
+        """Whether its accelerations are limited."""
+        return self._known_of(robot)[2]
+
+    def _known_of(self, robot: Robot) -> tuple[Robot, FloatArray, bool]:
+        if self._robot is None or self._robot[0] is not robot:
+            limits = robot.limits
+            bounded = np.isfinite([limits.acceleration_lower, limits.acceleration_upper]).all()
+            self._robot = (robot, joint_order(robot), bool(bounded))
+        return self._robot
 
 
 class Avoid(ClearanceConstraint):
@@ -179,21 +186,3 @@ class AvoidSelf(ClearanceConstraint):
     def excluded(robot: Robot) -> dict[tuple[str, str], str]:
         """Pairs of links that are not watched, each with the reason: "adjacent", "home" or "always"."""
         return excluded(robot)
-
-
-def _around(centre: FloatArray, radius: FloatArray, unknown: NDArray[np.bool_], v: FloatArray) -> FloatArray:
-    """(4, nv): where mean rates lie, as :func:`clearance_rows` reads it.
-
-    The centre is drawn towards zero by _SLOW, so that at rest a row is its tangent: curvature about a slow motion would
-    let a task that a row stops go on by picometres, paid for with motions of the null space at full speed, to and fro.
-    """
-    drawn = np.sign(centre) * np.maximum(np.abs(centre) - _SLOW, 0.0)
-    wide = radius + np.abs(centre - drawn)
-    return np.array([drawn, wide, np.where(unknown, _ANY_RATE, wide), v])
-
-
-def _unknown(box: Box | None, lower: FloatArray, upper: FloatArray) -> NDArray[np.bool_]:
-    """Whether nothing limits a joint, (nv,)."""
-    low, high = (lower, upper) if box is None else (box.lower, box.upper)
-    known: NDArray[np.bool_] = (np.isfinite(low) & np.isfinite(high)) | (np.isfinite(lower) & np.isfinite(upper))
-    return ~known

@@ -10,7 +10,7 @@ the box can break is left out, which leaves those of the few points that are nea
 
 from __future__ import annotations
 
-from math import exp, floor, inf, sqrt
+from math import copysign, exp, floor, inf, isfinite, sqrt
 
 from cartctl.checks import FloatArray, IntArray
 from cartctl.kernels import kernel, part
@@ -18,6 +18,8 @@ from cartctl.kernels import kernel, part
 MOST_ERROR = 0.025  # m: as for a frame's position
 BRAKE = 2.0  # times the deceleration planned with
 REST = 2e-5  # m held free beside the margin, in which one may rest: a way back of nanometres moves joints by degrees
+_SLOW = 0.1  # rad/s or m/s: so slow, the curvature of a motion counts as an error
+_ANY_RATE = 10.0  # rad/s or m/s: a joint whose speed nothing limits, where it is asked what is near
 SKIP = 1e-9  # m/s: what round-off may be of a row that no command can break
 
 
@@ -46,6 +48,41 @@ def mean_speed(room: float, error: float, closing: float, settings: FloatArray) 
     dt = settings[0]
     end = approach_speed(room - 0.5 * dt * closing, error, 2.0, settings)
     return float(0.5 * (closing + max(end, closing - BRAKE * settings[1] * dt)))
+
+
+@kernel("void(vector, vector, vector, vector, vector, vector, vector, float, out_matrix)")
+def mean_rates(
+    low: FloatArray,
+    high: FloatArray,
+    lower: FloatArray,
+    upper: FloatArray,
+    otherwise: FloatArray,
+    base: FloatArray,
+    v: FloatArray,
+    share: float,
+    rates: FloatArray,
+) -> None:
+    """Fill rates (4, nv): centre and half-width of ``base + share u`` in a step, the latter also of no limit, and v.
+
+    u lies in low..high, where those say nothing in lower..upper, else at ``otherwise``. The centre is drawn towards
+    zero by _SLOW, so that at rest a row is its tangent: curvature about a slow motion would let a task that a row stops
+    go on by picometres, paid for with motions of the null space at full speed, to and fro.
+    """
+    for j in range(v.shape[0]):
+        least, most = low[j], high[j]
+        known = (isfinite(least) and isfinite(most)) or (isfinite(lower[j]) and isfinite(upper[j]))
+        if not isfinite(least):
+            least = lower[j]
+        if not isfinite(most):
+            most = upper[j]
+        if not (isfinite(least) and isfinite(most)):
+            least = most = otherwise[j]
+        centre = base[j] + share * (0.5 * (least + most))
+        drawn = copysign(max(abs(centre) - _SLOW, 0.0), centre)
+        wide = share * (0.5 * max(most - least, 0.0)) + abs(centre - drawn)
+        rates[0, j], rates[1, j] = drawn, wide
+        rates[2, j] = wide if known else _ANY_RATE
+        rates[3, j] = v[j]
 
 
 @part

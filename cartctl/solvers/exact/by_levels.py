@@ -33,6 +33,7 @@ from cartctl.solvers.exact.working_set import (
 )
 
 _MISSED = 1e-9  # relative: a row of an interval level that is missed by less is met
+_DRIFTED = 3e-8  # relative: a dependent row that is missed by more was not what it seemed
 
 
 @part
@@ -81,6 +82,8 @@ def by_levels(
             size = task_size(e, first, last, levels.natural[k])
             outcome, scales[k], lost = scaled_level(w, q, e, first, last, size, members, start, proof, u, most)
             settled = outcome == MET
+            if lost and settled and _astray(e, first, last, scales[k], u):
+                flags |= DOUBT
         else:
             load(w, q, start, 1.0)
             settled = False
@@ -135,6 +138,19 @@ def _lock(w: WorkingSet, q: Inequalities) -> None:
             left = normal_of(q, 2 * i, w)
             append(w, 2 * i, left, q.B[0, i], 0.0, 0.0)
             q.state[i] = EQUAL
+
+
+@part
+def _astray(e: Equations, first: int, last: int, s: float, u: FloatArray) -> bool:
+    """Whether a row that says nothing beside the others is missed: what they magnify hides what it says."""
+    reach = largest_entry(u)
+    for i in range(first, last):
+        x, side = 0.0, e.base[i] + s * e.slope[i]
+        for k in range(u.shape[0]):
+            x += e.A[i, k] * u[k]
+        if abs(x - side) > _DRIFTED * (e.norm[i] * reach + abs(e.base[i]) + abs(e.slope[i])):
+            return True
+    return False
 
 
 @part

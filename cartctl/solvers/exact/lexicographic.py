@@ -3,7 +3,8 @@
 Near singularities decisions come down to round-off: whether a row is dependent, a vertex degenerate, a contradiction
 one. An answer that met such a decision, or that proves something impossible, is judged by its own multipliers
 (:mod:`cartctl.algebra.proofs`); one that fails is sought again without the guess, and then with joints, rows and the
-unit of u in other orders, which take other ways to the same optimum. The best by its multipliers is kept.
+unit of u in other orders, which take other ways to the same optimum. The best by its multipliers is kept, and what none
+of them proves is flagged UNPROVEN.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from cartctl.checks import FloatArray
 from cartctl.kernels import kernel, part
 from cartctl.solvers.exact.by_priority import by_priority
 from cartctl.solvers.exact.disguise import Given, disguised, order_of, unveiled
-from cartctl.solvers.exact.kinds import CONTRADICTORY, DOUBT, EXTREME, STUCK
+from cartctl.solvers.exact.kinds import CONTRADICTORY, DOUBT, EXTREME, STUCK, UNPROVEN
 
 _check = part(check_proofs.function)
 
@@ -95,7 +96,7 @@ def _sure(
                 out_proofs[:, :] = proofs
         if best <= _PROVEN:
             break
-    return flags
+    return flags if best <= _PROVEN else flags | UNPROVEN
 
 
 @part

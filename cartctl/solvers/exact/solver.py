@@ -13,7 +13,7 @@ from cartctl.algebra.solution import Solution, Status
 from cartctl.checks import FloatArray
 from cartctl.solvers.base import Solver
 from cartctl.solvers.exact.call import answer, certificate
-from cartctl.solvers.exact.kinds import CONTRADICTORY, LOST_RANK, STUCK
+from cartctl.solvers.exact.kinds import CONTRADICTORY, LOST_RANK, STUCK, UNPROVEN
 from cartctl.solvers.exact.lexicographic import lexicographic
 
 
@@ -39,9 +39,11 @@ class ExactSolver(Solver):
             found = answer(problem, self.fits_all, start)
         except FloatingPointError:
             return self._failed(problem)
-        status = Status.INFEASIBLE if found.flags & CONTRADICTORY else None
         if found.flags & STUCK:
-            status = Status.FAILED
+            return self._failed(problem)
+        status = Status.UNPROVEN if found.flags & UNPROVEN else None
+        if found.flags & CONTRADICTORY:
+            status = Status.INFEASIBLE
         lost = bool(found.flags & LOST_RANK)
         solution = Solution(problem, found.u, self.name, self, status, lost, found.scales)
         solution.warm = found.active
