@@ -24,12 +24,12 @@ if TYPE_CHECKING:
 
 GHOST = COLORS[4]
 GHOST_WORDS = (
-    "the posture in which the arm would be now had its joints only followed the hand, by the least rates from the same "
+    "The posture in which the arm would be now had its joints only followed the hand, by the least rates from the same "
     "start: without anything in the null space, and without limits"
 )
 ELLIPSOID_WORDS = {
-    "velocity": "how fast the hand can move each way with joint rates of norm 1; 1 m of it is {unit} m/s",
-    "force": "what force the hand can bear each way with joint torques of norm 1; 1 m of it is {unit} N, long axes are "
+    "velocity": "How fast the hand can move each way with joint rates of norm 1; 1 m of it is {unit} m/s",
+    "force": "What force the hand can bear each way with joint torques of norm 1; 1 m of it is {unit} N, long axes are "
     "cut",
 }
 
