@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from cartctl.motion.run import Run, TaskRecord
 
 _PART = 0.02  # s between two postures of the ghost, at most
+_MOST = 20_000  # postures in between
 _ROUNDS = 2  # of correction each
 _STEP = 0.3  # rad or m that a joint may go in a round
 _DAMPING = 1e-2  # of the largest singular value
@@ -47,7 +48,7 @@ def ghost_postures(run: Run, shown: IntArray) -> Array | None:
 
 def _samples(time: Array, shown: IntArray) -> IntArray:
     """The samples that are shown, and enough between them."""
-    step = max(int(round(_PART / max(float(np.median(np.diff(time))), 1e-9))), 1)
+    step = max(round(_PART / max(float(np.median(np.diff(time))), 1e-9)), -(-len(time) // _MOST), 1)
     return np.unique(np.concatenate([shown, np.arange(0, len(time), step)])).astype(np.int64)
 
 
