@@ -19,7 +19,6 @@ from typing import Any
 import numpy as np
 import pytest
 from PIL import Image
-from websockets.sync.client import ClientConnection, connect
 
 NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
 FLAGS = (
@@ -86,7 +85,7 @@ def difference(a: Shot, b: Shot, rows: slice = slice(None), columns: slice = sli
 class Tab:
     """One page in a Chromium that stays: it is clicked, dragged and asked, and notes console and requests."""
 
-    def __init__(self, socket: ClientConnection) -> None:
+    def __init__(self, socket: Any) -> None:
         self._socket, self._number = socket, 0
         self.console: list[str] = []
         self.requests: list[str] = []
@@ -118,10 +117,12 @@ class Tab:
                 self.requests.append(url)
 
     def open(self, url: str) -> None:
-        """Go to a page, forgetting what was noted of the last one."""
-        self.console, self.requests = [], []
-        self.call("Page.navigate", url=url)
-        self.until("document.readyState === 'complete'")
+        """Go to a page, loaded anew, forgetting what was noted of the last one."""
+        for address in ("about:blank", url):  # another moment of the same page alone would load nothing
+            self.call("Page.navigate", url=address)
+            self.until(f"location.href === {json.dumps(address)} && document.readyState === 'complete'")
+            if address != url:
+                self.console, self.requests = [], []
 
     def resize(self, width: int, height: int, phone: bool = False) -> None:
         """Give the page another size, as on a phone or not."""
@@ -149,6 +150,12 @@ class Tab:
             pixels = np.asarray(image.convert("RGB"))
         return Shot(pixels, list(self.console), sorted(set(self.requests)))
 
+    def look(self, page: Path, fragment: str = "", size: tuple[int, int] = (1280, 800), phone: bool = False) -> Shot:
+        """What a page looks like at a moment, in a window of this size."""
+        self.resize(*size, phone=phone)
+        self.open(page.resolve().as_uri() + fragment)
+        return self.picture()
+
     def drag(self, start: tuple[float, float], end: tuple[float, float], moves: int = 8) -> None:
         """Press the mouse at one place and let it go at another, in px."""
         self._mouse("mouseMoved", *start)
@@ -168,6 +175,7 @@ def browser(size: tuple[int, int] = (1280, 800)) -> Iterator[Tab]:
     """A tab of a Chromium that lives as long as the block, with every name on the network unresolvable."""
     program = find()
     assert program is not None, "mark the test with needs_chromium"
+    connect = pytest.importorskip("websockets.sync.client").connect
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as profile:
         flags = [f"--user-data-dir={profile}", f"--window-size={size[0]},{size[1]}", "--remote-debugging-port=0"]
         command = [program, *FLAGS, *flags, "about:blank"]
@@ -188,6 +196,7 @@ def _page_address(profile: Path) -> str:
         assert time.monotonic() < end, "Chromium did not start"
         time.sleep(0.05)
     port, root = port_file.read_text().split()[:2]
+    connect = pytest.importorskip("websockets.sync.client").connect
     with connect(f"ws://127.0.0.1:{port}{root}", max_size=None) as socket:
         socket.send(json.dumps({"id": 1, "method": "Target.getTargets"}))
         targets = json.loads(socket.recv(timeout=30))["result"]["targetInfos"]

@@ -9,7 +9,6 @@ import os
 import re
 import socket
 import subprocess
-from collections.abc import Iterator
 from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
@@ -23,7 +22,7 @@ import zmq
 from cartctl.errors import ParameterError
 from cartctl.report import write_html
 from cartctl.report.html import page, quantity
-from tests.chromium import Shot, Tab, browser, difference, needs_chromium, share, shoot
+from tests.chromium import Tab, difference, needs_chromium, share, shoot
 from tests.report_runs import panda_run, planar_run, robot_of, run_of
 
 HOSTILE = '</script><script>document.title="pwned"</script><img src=x onerror=alert(1)>&amp;"\'--><b>ü$title{}'
@@ -255,23 +254,10 @@ def test_policy_allows_these_scripts_and_no_request(planar_page: Path) -> None:
 # --- in a browser --------------------------------------------------------------------------------------------------
 
 
-@pytest.fixture(scope="module")
-def tab() -> Iterator[Tab]:
-    with browser() as tab:
-        yield tab
-
-
-def look(tab: Tab, page: Path, fragment: str, size: tuple[int, int] = (1280, 800)) -> Shot:
-    """What a page looks like at a moment."""
-    tab.resize(*size)
-    tab.open(page.resolve().as_uri() + fragment)
-    return tab.picture()
-
-
 @needs_chromium
 @pytest.mark.chromium
 def test_browser_draws_the_robot_and_moves_it(planar_page: Path, tab: Tab) -> None:
-    early, late = look(tab, planar_page, "#t=0.05"), look(tab, planar_page, "#t=0.5")
+    early, late = tab.look(planar_page, "#t=0.05"), tab.look(planar_page, "#t=0.5")
     for shot in (early, late):
         assert not shot.console and not shot.requests
         assert share(shot, BLUE, 40) > 0.01 and share(shot, RED, 40) > 0.01  # both links
@@ -286,7 +272,7 @@ def test_browser_draws_the_robot_and_moves_it(planar_page: Path, tab: Tab) -> No
 @needs_chromium
 @pytest.mark.chromium
 def test_browser_plays_by_itself(planar_page: Path, tab: Tab) -> None:
-    first = look(tab, planar_page, "", (1000, 400))
+    first = tab.look(planar_page, "", (1000, 400))
     began = tab.ask("Number(document.getElementById('time').value)")
     tab.until(f"Math.abs(Number(document.getElementById('time').value) - {began}) > 0.2")
     second = tab.picture()
@@ -297,7 +283,7 @@ def test_browser_plays_by_itself(planar_page: Path, tab: Tab) -> None:
 @needs_chromium
 @pytest.mark.chromium
 def test_browser_fits_the_robot_into_a_phone(planar_page: Path, tab: Tab) -> None:
-    shot = look(tab, planar_page, "#t=0.5", (412, 800))
+    shot = tab.look(planar_page, "#t=0.5", (412, 800))
     assert share(shot, BLUE, 40) > 0.005 and share(shot, RED, 40) > 0.005
     edge = np.concatenate([shot.pixels[:, :6], shot.pixels[:, -6:]], axis=1)
     assert not (np.abs(edge.astype(int) - RED).max(axis=2) <= 40).any()
@@ -306,7 +292,7 @@ def test_browser_fits_the_robot_into_a_phone(planar_page: Path, tab: Tab) -> Non
 @needs_chromium
 @pytest.mark.chromium
 def test_browser_shows_the_panda(panda_page: Path, tab: Tab) -> None:
-    shot = look(tab, panda_page, "#t=1.3")
+    shot = tab.look(panda_page, "#t=1.3")
     assert not shot.console and not shot.requests
     middle = shot.pixels[60:640, 440:900].astype(int)
     light = (middle.min(axis=2) > 170) & (np.ptp(middle, axis=2) < 6)  # its covers are white, the background is blueish
@@ -320,7 +306,7 @@ def test_browser_shows_the_panda(panda_page: Path, tab: Tab) -> None:
 def test_hostile_names_do_nothing_in_a_browser(tmp_path: Path, tab: Tab) -> None:
     run = planar_run(HOSTILE)
     run.tasks[0].name = HOSTILE
-    shot = look(tab, write_html(run, tmp_path / "run.html"), "#t=0.5")
+    shot = tab.look(write_html(run, tmp_path / "run.html"), "#t=0.5")
     assert not shot.console and not shot.requests and share(shot, RED, 40) > 0.01
 
 

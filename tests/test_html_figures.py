@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import base64
 import json
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +18,7 @@ from cartctl.report.ellipsoids import shapes_of
 from cartctl.report.html import page
 from cartctl.report.lifting import ghost_postures
 from cartctl.report.run_curves import run_panels
-from tests.chromium import Tab, browser, difference, needs_chromium
+from tests.chromium import Tab, difference, needs_chromium
 from tests.standing_arm import ARM, HOME
 from tests.test_html import Reader
 
@@ -221,12 +220,6 @@ def test_ellipsoids_are_those_of_the_jacobian_and_do_not_spin(robot: cc.Robot, r
 
 
 # --- in a browser -----------------------------------------------------------------------------------------------------
-
-
-@pytest.fixture(scope="module")
-def tab() -> Iterator[Tab]:
-    with browser((1000, 700)) as tab:
-        yield tab
 
 
 def at(tab: Tab) -> float:
