@@ -118,10 +118,10 @@ class Tab:
 
     def open(self, url: str) -> None:
         """Go to a page, loaded anew, forgetting what was noted of the last one."""
-        for address in ("about:blank", url):  # another moment of the same page alone would load nothing
+        for address, sign in (("about:blank", "==="), (url, "!==")):  # another moment of one page would load nothing
             self.call("Page.navigate", url=address)
-            self.until(f"location.href === {json.dumps(address)} && document.readyState === 'complete'")
-            if address != url:
+            self.until(f"location.href {sign} 'about:blank' && document.readyState === 'complete'")
+            if sign == "===":
                 self.console, self.requests = [], []
 
     def resize(self, width: int, height: int, phone: bool = False) -> None:

@@ -392,6 +392,7 @@ def test_it_ends_when_nobody_comes_back(controller: cc.Controller, monkeypatch: 
 
 def test_what_is_changed_on_the_page_is_done(controller: cc.Controller) -> None:
     pytest.importorskip("viser")
+    controller.tasks[0].gain = np.array([10.0, 12.0])
     with shown(controller) as (show, _):
         session, panel, handle = show.session, show.panel, show.scene.handles[0]
         handle.position = tuple(np.array(handle.position) + [-0.2, 0.0, 0.1])
@@ -407,6 +408,7 @@ def test_what_is_changed_on_the_page_is_done(controller: cc.Controller) -> None:
         assert session.controller.solver.name == "pinv"
         panel._solver.value = "sns"
         wait(lambda: session.controller.solver.name == "sns")
+        assert (controller.tasks[0].gain == [10.0, 12.0]).all()  # until somebody moves the slider
         panel._speed.value, panel._gain.value = 50, 5.0
         wait(lambda: session.controller.limits.velocity_upper[0] == 1.0 and controller.tasks[0].gain == 5.0)
         panel._objective.value = NONE  # or the null space moves on from home

@@ -114,11 +114,13 @@ class Show:
 
     def _aim(self) -> None:
         """Targets to where the handles are, gains to where the slider is."""
-        bounded = self.session.controller.limits is not None
+        bounded, gain = self.session.controller.limits is not None, self.panel.gain
         for index, task in enumerate(self._hands):
             wanted = self.scene.target(index)
             self._aims[index] = wanted if bounded else towards(self._aims[index], wanted, 1.0 / FPS, self.scene.size)
-            task.target, task.gain = self._aims[index], self.panel.gain
+            task.target = self._aims[index]
+            if gain is not None:
+                task.gain = gain
 
     def _press(self) -> None:
         pressed = self.panel.pressed()

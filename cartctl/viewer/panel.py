@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from cartctl.levels import get_level
 from cartctl.motion.controller import Controller
 from cartctl.objectives.named import KNOWN
 from cartctl.tasks import FrameTask
@@ -24,9 +25,11 @@ class Panel:
     def __init__(self, gui: Any, controller: Controller, hands: list[FrameTask]) -> None:
         self._gui, self._lock = gui, threading.Lock()
         self._pressed: set[str] = set()
-        top = min(_GAINS[1], _STABLE * controller.level.stable_below / controller.dt)
+        stable = min(get_level(name).stable_below for name in LEVELS)
+        top = max(min(_GAINS[1], _STABLE * stable / controller.dt), _GAINS[0])
         gain = float(np.clip(np.max(hands[0].gain), _GAINS[0], top))
         gui.configure_theme(show_logo=False, show_share_button=False, control_width="medium", brand_color=(0, 114, 178))
+        self._initial, self._moved = gain, False
         self.status = gui.add_html("")
         self.trouble = gui.add_html("")
         gui.add_button_group("", ("pause", "target to hand", "home")).on_click(self._click)
@@ -62,9 +65,11 @@ class Panel:
         self._strength.value = float(np.log10(method.strength))
 
     @property
-    def gain(self) -> float:
-        """1/s."""
-        return float(self._gain.value)
+    def gain(self) -> float | None:
+        """1/s, None as long as nobody has moved the slider: until then each task has its own."""
+        value = float(self._gain.value)
+        self._moved = self._moved or value != self._initial
+        return value if self._moved else None
 
     @property
     def shares(self) -> tuple[float, float]:
