@@ -1,7 +1,7 @@
 """What one step costs: medians in us, and as ratios against raw calls made in the same run.
 
     python benchmarks/step_time.py            # print the table
-    python benchmarks/step_time.py --save     # and write benchmarks/results/step_time.csv and the table in the README
+    python benchmarks/step_time.py --save     # and write benchmarks/results/step_time.csv for the page of measurements
 
 Rounds of all candidates are interleaved, so that a machine that changes its pace changes it for all of them; the ratio
 is the median of the rounds' ratios against Pinocchio's computeFrameJacobian.

@@ -27,6 +27,7 @@ _HOMES = {
         "Truncated",
     ),
     "cartctl.solvers": ("EquationSolver", "Solver", "solve", "solvers"),
+    "cartctl.solvers.citing": ("cite",),
     "cartctl.levels.metrics": ("JointLimitMetric",),
     "cartctl.solvers.dls_manipulability": ("DLSManipulability",),
     "cartctl.solvers.dls_sigma": ("DLSSigma",),
@@ -224,6 +225,7 @@ if TYPE_CHECKING:  # editors and mypy see what __getattr__ finds
     from cartctl.solvers import Solver as Solver
     from cartctl.solvers import solve as solve
     from cartctl.solvers import solvers as solvers
+    from cartctl.solvers.citing import cite as cite
     from cartctl.solvers.dls import DLS as DLS
     from cartctl.solvers.dls_manipulability import DLSManipulability as DLSManipulability
     from cartctl.solvers.dls_sigma import DLSSigma as DLSSigma

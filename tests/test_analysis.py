@@ -472,6 +472,16 @@ def test_projectors_pass_in_their_own_metric_alone(system, kind, size):
     assert plain.symmetric == np.allclose(oblique, P, atol=1e-9)
 
 
+def test_verdicts_are_true_or_false():
+    """``if analysis.penrose(A, X):`` asks what it seems to ask, and is not always true as of any object."""
+    A, W = np.array([[1.0, 0.0, -0.25], [0.0, 1.0, 0.4]]), np.diag([1.0, 2.0, 5.0])
+    reflexive = np.linalg.solve(W, A.T) @ np.linalg.inv(A @ np.linalg.solve(W, A.T))
+    assert analysis.penrose(A, np.linalg.pinv(A)) and not analysis.penrose(A, reflexive)
+    assert analysis.check_projector(projector(A), A) and not analysis.check_projector(0.5 * projector(A), A)
+    assert analysis.kinematic_singularity(np.vstack([A[0], A[0]])) and not analysis.kinematic_singularity(A)
+    assert analysis.algorithmic_singularity(A, 2 * A[:1]) and not analysis.algorithmic_singularity(A[:1], A[1:])
+
+
 def test_each_fault_of_a_projector_is_found():
     rng = np.random.default_rng(11)
     A = oracles.matrix(rng, 2, 5)

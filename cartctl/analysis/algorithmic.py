@@ -28,6 +28,10 @@ class AlgorithmicSingularity:
     stacked_rank: int
     closeness: float
 
+    def __bool__(self) -> bool:
+        """It occurs."""
+        return self.occurs
+
     @property
     def occurs(self) -> bool:
         """``rank [J_1; J_2; ...] < sum rank J_k``, each task of full rank, ``sum m_k <= n``."""

@@ -31,6 +31,10 @@ class KinematicSingularity:
     lost: FloatArray
     names: tuple[str, ...]
 
+    def __bool__(self) -> bool:
+        """It occurs."""
+        return self.occurs
+
     @property
     def occurs(self) -> bool:
         """Whether ``rank J < m``."""

@@ -25,6 +25,10 @@ class Penrose:
     residuals: tuple[float, float, float, float]
     conditions: tuple[bool, bool, bool, bool]
 
+    def __bool__(self) -> bool:
+        """All four conditions hold: X is the pseudo-inverse."""
+        return self.pseudo_inverse
+
     @property
     def generalised(self) -> bool:
         """Condition 1: X b solves A u = b wherever that can be solved."""

@@ -31,6 +31,10 @@ class ProjectorCheck:
     nullity: int | None
     tolerance: float
 
+    def __bool__(self) -> bool:
+        """It passed."""
+        return self.passed
+
     @property
     def idempotent(self) -> bool:
         """``P P = P``: a projector at all."""

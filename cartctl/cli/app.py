@@ -9,6 +9,7 @@ import typer
 from cartctl import __version__
 from cartctl.cli.bench import app as bench
 from cartctl.cli.calibrate import calibrate
+from cartctl.cli.cite import cite
 from cartctl.cli.compare import compare
 from cartctl.cli.doctor import doctor
 from cartctl.cli.info import info
@@ -65,4 +66,5 @@ app.command(epilog="Example:  cartctl play panda\n\nExample:  cartctl play my_ro
     play
 )
 app.command(epilog="Example:  cartctl info panda")(info)
+app.command(epilog="Example:  cartctl cite sns >> paper.bib")(cite)
 app.command(epilog="Example:  cartctl doctor")(doctor)

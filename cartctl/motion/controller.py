@@ -59,6 +59,13 @@ class Controller:
 
     Raises NoTasksError, ProblemError, TimeStepError, FrameNotFound, JointNotFound, SolverNotFound, LevelNotFound,
     UnsupportedProblem, UnderactuatedRobot, MetricError, ParameterError, NonFiniteError.
+
+    >>> import cartctl as cc
+    >>> robot = cc.load("panda")
+    >>> tip = cc.FrameTask(robot.tool, "position", target=[0.5, 0.2, 0.5])
+    >>> controller = cc.Controller(robot, tip, solver="projected-gradient", objective=cc.JointRange(), limits=None)
+    >>> controller.step(robot.home).velocity.shape
+    (7,)
     """
 
     def __init__(

@@ -18,6 +18,10 @@ def exerting_torques(J: Any, wrench: Any) -> FloatArray:
 
     J: (m, n). At rest, without gravity: add ``state.gravity`` to carry the arm's own weight. Prismatic joints have
     forces. Raises ShapeError, NonFiniteError.
+
+    >>> from cartctl import statics
+    >>> print(statics.exerting_torques([[0.0, 0.0], [1.0, 0.5]], [3.0, 2.0]))
+    [2. 1.]
     """
     J = checks.matrix("J", J)
     torque: FloatArray = J.T @ checks.vector("wrench", wrench, J.shape[0])

@@ -132,6 +132,14 @@ class PostureTask(JointTask):
 
     target: (m,) coordinates or None for home; everything else as in :class:`cartctl.JointTask`. A moving base is left
     out.
+
+    >>> import cartctl as cc
+    >>> robot = cc.planar([1.0, 1.0, 1.0])
+    >>> tasks = [cc.FrameTask("tool", "xy"), cc.PostureTask(gain=2.0)]  # the posture with what the tip leaves free
+    >>> controller = cc.Controller(robot, tasks, solver="task-priority", limits=None, dt=0.01)
+    >>> run = cc.simulate(controller, [0.1, 0.9, 0.4], duration=1.0)
+    >>> run.metrics().tasks[0].max_m < 1e-4
+    True
     """
 
     kind: ClassVar[str] = "posture"
