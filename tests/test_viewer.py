@@ -398,6 +398,12 @@ def test_what_is_changed_on_the_page_is_done(controller: cc.Controller) -> None:
         handle.position = tuple(np.array(handle.position) + [-0.2, 0.0, 0.1])
         wanted = show.scene.target(0).translation
         wait(lambda: np.linalg.norm(controller.robot.state(session.q).position("tip") - wanted) < 1e-4)
+        panel.ellipsoid.value = True
+        ball = show.scene._ellipsoids[0]
+        wait(lambda: ball.visible and np.allclose(ball.position, wanted, atol=1e-3))
+        J = controller.robot.state(session.q).jacobian("tip")[:3]
+        reach = np.linalg.svd(J, compute_uv=False)
+        assert np.allclose(sorted(ball.scale), sorted(np.maximum(0.25 * reach, 1e-3)), atol=1e-2)
         panel._solver.value = "pinv"
         wait(lambda: session.controller.solver.name == "pinv")
         wait(lambda: "knows no limits" in panel.trouble.content)

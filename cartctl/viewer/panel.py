@@ -50,7 +50,9 @@ class Panel:
             self._force = gui.add_slider("accel. limit, %", 5, 100, 1, 100, hint="share of its acceleration limits")
         with gui.add_folder("picture", expand_by_default=False):
             self.trace = gui.add_checkbox("trace of the hand", True)
-            self.ellipsoid = gui.add_checkbox("velocity ellipsoid", False, hint="what unit joint speeds reach")
+            self.ellipsoid = gui.add_checkbox(
+                "velocity ellipsoid", False, hint="what joint rates of norm 1 reach; 1 m/s is drawn as 0.25 m"
+            )
         gui.add_html(f'<div style="font-size:11.5px;line-height:1.4;opacity:.65;padding:2px 10px 6px">{_HINT}</div>')
 
     @property

@@ -8,18 +8,18 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
+from cartctl.analysis import velocity_ellipsoid
 from cartctl.checks import FloatArray
 from cartctl.model.robot import Robot
 from cartctl.report.actor import rgb
 from cartctl.report.bodies import Body, bodies
 from cartctl.report.mesh import shade
 from cartctl.report.palette import COLORS
-from cartctl.report.stage import Stage
 from cartctl.tasks import FrameTask
+from cartctl.viewer.backdrop import set_stage
 
 _TRACE, _GAP = 600, 2e-3  # points of the trace, and the m between two of them
-_FOV, _ASIDE = 36.0, 0.09  # deg, vertical; shift of the view in its own distance
-_ROOM = 1.3  # times the robot at home that is in the picture at first
+_REACH = 0.25  # m drawn for 1 m/s of the velocity ellipsoid
 _GREY = 26  # of 255: how much of a body's colours may differ without a mesh of its own
 
 
@@ -45,27 +45,8 @@ class Scene:
         self._lines: list[Any] = [None] * len(tasks)
         self.trace, self.ellipsoids = True, False
         self._ellipsoids = [self._ball(k) for k in range(len(tasks))]
-        self._stage(seen)
+        set_stage(server, seen, self.size)
         self.show(q)
-
-    def _stage(self, seen: FloatArray) -> None:
-        """Floor, light and camera, as in the report."""
-        floor = min(float(seen[:, 2].min()), 0.0)
-        middle = 0.5 * (seen.min(axis=0) + seen.max(axis=0))
-        look = Stage(middle + _ROOM * (seen - middle), floor).view
-        camera = self._server.initial_camera
-        camera.fov = float(np.deg2rad(_FOV))
-        right = np.cross([0.0, 0.0, 1.0], look.offset)
-        aside = _ASIDE * np.linalg.norm(look.offset) * right / np.linalg.norm(right)  # the panel covers the right side
-        camera.look_at, camera.position = tuple(look.center + aside), tuple(look.center + look.offset + aside)
-        cell = 10.0 ** np.round(np.log10(self.size / 8.0))
-        self._scene.add_grid(
-            "/floor", infinite_grid=True, cell_size=cell, section_size=5 * cell, cell_color=(205, 212, 219),
-            section_color=(176, 186, 196), fade_distance=7.0 * self.size, shadow_opacity=0.25,
-            position=(0.0, 0.0, floor - 1e-3 * self.size),
-        )  # fmt: skip
-        self._scene.set_background_image(_sky())
-        self._scene.world_axes.visible = False
 
     def _body(self, index: int, body: Body) -> None:
         """One mesh a colour: viser's know only one each."""
@@ -142,12 +123,10 @@ class Scene:
         )  # fmt: skip
 
     def _draw_ellipsoid(self, index: int, task: FrameTask, q: FloatArray, at: FloatArray) -> None:
-        from cartctl.analysis import velocity_ellipsoid
-
         found = velocity_ellipsoid(self._robot.state(q).jacobian(task.frame)[:3])
         axes = found.axes * np.sign(np.linalg.det(found.axes))
         ball = self._ellipsoids[index]
-        ball.scale = tuple(float(max(0.25 * self.size * s / max(self.size, 1e-9), 1e-3)) for s in found.lengths)
+        ball.scale = tuple(max(_REACH * float(length), 1e-3) for length in found.lengths)
         ball.position, ball.wxyz = tuple(at), wxyz(axes)
 
 
@@ -171,11 +150,3 @@ def _corners(body: Body, placed: pin.SE3) -> FloatArray:
 def _bytes(color: str) -> tuple[int, int, int]:
     r, g, b = (round(255 * float(c)) for c in rgb(color))
     return r, g, b
-
-
-def _sky() -> Any:
-    """The report's background as a picture."""
-    from cartctl.report.stage import HORIZON, SKY
-
-    shade_ = np.linspace(SKY, HORIZON, 64)[:, None, :]
-    return np.rint(255 * np.repeat(shade_, 2, axis=1)).astype(np.uint8)
