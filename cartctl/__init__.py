@@ -113,6 +113,7 @@ _HOMES = {
         "Start",
         "plan",
     ),
+    "cartctl.viewer": ("play",),
     "cartctl.paths": (
         "Circle",
         "Ellipse",
@@ -253,6 +254,7 @@ if TYPE_CHECKING:  # editors and mypy see what __getattr__ finds
     from cartctl.tasks import Reference as Reference
     from cartctl.tasks import RelativeFrameTask as RelativeFrameTask
     from cartctl.tasks import Task as Task
+    from cartctl.viewer import play as play
     from cartctl.wholepath import JointSpeed as JointSpeed
     from cartctl.wholepath import LocalMethod as LocalMethod
     from cartctl.wholepath import PathCost as PathCost

@@ -14,6 +14,7 @@ from cartctl.cli.compare import compare
 from cartctl.cli.doctor import doctor
 from cartctl.cli.info import info
 from cartctl.cli.plan import plan
+from cartctl.cli.play import play
 from cartctl.cli.track import track
 
 _EXAMPLE = "Example:  cartctl track panda --open"
@@ -61,6 +62,9 @@ app.command(
     epilog="Example:  cartctl plan panda --closed --free-start --open\n\n"
     "Example:  cartctl plan lwr --objective joint-speed --path polygon --samples 300"
 )(plan)
+app.command(epilog="Example:  cartctl play panda\n\nExample:  cartctl play my_robot.urdf --solver hqp --level torque")(
+    play
+)
 app.command(epilog="Example:  cartctl info panda")(info)
 app.command(epilog="Example:  cartctl cite sns >> paper.bib")(cite)
 app.command(epilog="Example:  cartctl doctor")(doctor)

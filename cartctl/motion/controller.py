@@ -99,6 +99,11 @@ class Controller:
     ) -> None:
         if not isinstance(robot, Robot):
             raise ParameterError(f"robot is a {type(robot).__name__}; expected a Robot from cc.load(...)")
+        self._given = {
+            "robot": robot, "tasks": tasks, "solver": solver, "level": level, "objective": objective, "metric": metric,
+            "dt": dt, "soft_start": soft_start, "constraints": constraints, "disabled": disabled, "jerk": jerk,
+            "path_clock": path_clock, "approach": approach, "singularity": singularity,
+        }  # fmt: skip
         self.robot = robot
         self.tasks = checked_tasks(tasks, robot)
         self.solver = get_solver(solver)
@@ -137,6 +142,18 @@ class Controller:
         if self._stroke is None:
             self._confining.prepare()
         self._ahead = False  # whether what lasts is with the stroke, and what is here is out of date
+
+    def replace(self, **changes: Any) -> Controller:
+        """A new Controller with some arguments changed, as in ``controller.replace(solver="hqp")``; it starts afresh.
+
+        It works under the limits in force here, unless it is given others. Raises as the constructor does,
+        UnsupportedProblem where a solver honours no limits and ``limits=None`` does not say so.
+        """
+        unknown = [name for name in changes if name not in self._given and name != "limits"]
+        if unknown:
+            known = ", ".join([*self._given, "limits"])
+            raise ParameterError(f"a Controller has no argument {unknown[0]!r}; expected one of {known}")
+        return Controller(**{"limits": self._limits, **self._given, **changes})
 
     def reset(self) -> None:
         """Forget all that lasts from step to step, as before the first one."""
