@@ -218,7 +218,7 @@ def _left_out(
         out = False
         if lower.shape[0] > 0:
             still = joints[_STILL, j]
-            out = (wanted[j] > 0.0 and upper[j] <= still) or (wanted[j] < 0.0 and lower[j] >= -still)
+            out = (wanted[j] > 0.0 and abs(upper[j]) <= still) or (wanted[j] < 0.0 and abs(lower[j]) <= still)
         if out and not found:
             found = True
             for i in range(m):

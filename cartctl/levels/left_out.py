@@ -38,7 +38,8 @@ def leave_out(
     found, out = False, np.zeros(n)
     for j in range(n):
         still = joints[_STILL, j]
-        if (wanted[j] > 0.0 and upper[j] <= still) or (wanted[j] < 0.0 and lower[j] >= -still):
+        # a joint that moves the other way has a bound beyond zero, for its acceleration is limited: it does not stand
+        if (wanted[j] > 0.0 and abs(upper[j]) <= still) or (wanted[j] < 0.0 and abs(lower[j]) <= still):
             A[:, j] = 0.0
             out[j] = 1.0
             found = True
