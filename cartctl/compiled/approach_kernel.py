@@ -175,7 +175,7 @@ def _directions(
     if not _turned(J, turn, room):
         _straight(turn)
         return False
-    if not _left_out(J, b, joints, lower, upper, size, turn, room):
+    if not _left_out(J, b, joints, lower, upper, size, rate.shape[0] > 0, turn, room):
         _fill(J, b, rate, error, joints, dt, size, turn, room)
         return True
     if not _turned(room.A[:m], other, room):
@@ -200,6 +200,7 @@ def _left_out(
     lower: FloatArray,
     upper: FloatArray,
     size: float,
+    moving: bool,
     turn: FloatArray,
     room: Room,
 ) -> bool:
@@ -218,7 +219,8 @@ def _left_out(
         out = False
         if lower.shape[0] > 0:
             still = joints[_STILL, j]
-            out = (wanted[j] > 0.0 and abs(upper[j]) <= still) or (wanted[j] < 0.0 and abs(lower[j]) <= still)
+            beyond = upper[j] if wanted[j] > 0.0 else -lower[j]
+            out = wanted[j] != 0.0 and beyond <= still and (beyond >= -still or not moving)
         if out and not found:
             found = True
             for i in range(m):
