@@ -36,6 +36,7 @@ from cartctl.solvers.exact.working_set import (
     FIXED,
     FREE,
     KIND,
+    NEARLY,
     NUM,
     SUM,
     TIED,
@@ -45,6 +46,7 @@ from cartctl.solvers.exact.working_set import (
     Y,
     append,
     combine,
+    largest_entry,
     place,
     refill,
     remove,
@@ -53,6 +55,7 @@ from cartctl.solvers.exact.working_set import (
 MET, SKIPPED = 0, 1  # how a level went; or STALLED
 
 _NOTHING = 1e-13  # s below this is zero
+_STEEP = 1e3  # a share this large in what limits s: it magnifies round-off
 _WORSE = 10.0  # a normal with a share this large stands better outside the working set
 
 
@@ -91,6 +94,8 @@ def scaled_level(
     if code == STALLED:
         return STALLED, math.nan, lost
     if implied != NOBODY:
+        if largest_entry(w.V[Y, : w.K[NUM, 0]]) > _STEEP:
+            w.K[NEARLY, 0] += 1
         write_proof(w, q, e.norm, implied, proof)
         if rise(w, e, implied) < 0.0:  # a row that pins s proves both directions
             for i in range(proof.shape[0]):
