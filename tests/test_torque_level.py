@@ -305,7 +305,7 @@ def test_the_whole_registry_works():
     for name in cc.solvers():
         task = moving(robot, "position", rng)
         if name == "extended-jacobian":
-            with pytest.raises(UnsupportedProblem, match="extremal"):
+            with pytest.raises(UnsupportedProblem, match="level 'torque' has no rows .* extremal"):
                 cc.Controller(robot, task, name, "torque", limits=None, objective=cc.JointRange())
             continue
         takes = cc.solvers.get_solver(name).takes_metric

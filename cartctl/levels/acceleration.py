@@ -62,12 +62,15 @@ class AccelerationLevel(Level):
         self._damps = self.damping is not None and bool(np.any(self.damping))
         self.loads: Loads = Loads(friction, wrenches)
 
-    def check(self, solver: Solver) -> None:
-        """Refuse a method that keeps an objective extremal, and damping with one that takes no reference."""
+    def check(self, solver: Solver, name: str | None = None) -> None:
+        """Refuse a method that keeps an objective extremal, and damping with one that takes no reference.
+
+        name: of the level that asks, its own if None.
+        """
         if solver.extends:
             raise UnsupportedProblem(
-                "level 'acceleration' has no rows that keep an objective extremal; use level 'velocity', or a solver "
-                "that spends the objective through u0, such as 'projected-gradient'"
+                f"level {(name or self.name)!r} has no rows that keep an objective extremal; use level 'velocity', or a "
+                "solver that spends the objective through u0, such as 'projected-gradient'"
             )
         if self._damps and "reference" not in solver.honours:
             raise UnsupportedProblem(

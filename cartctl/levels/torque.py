@@ -80,7 +80,7 @@ class TorqueLevel(Level):
 
     def check(self, solver: Solver) -> None:
         """As at the acceleration level; refuses damping with a solver that takes no reference."""
-        AccelerationLevel(self.damping if self._damps and self.damping is not None else 0.0).check(solver)
+        AccelerationLevel(self.damping if self._damps and self.damping is not None else 0.0).check(solver, self.name)
         self._kernel = through_inertia.compiled
 
     def check_robot(self, robot: Robot) -> None:
