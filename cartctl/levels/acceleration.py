@@ -69,8 +69,8 @@ class AccelerationLevel(Level):
         """
         if solver.extends:
             raise UnsupportedProblem(
-                f"level {(name or self.name)!r} has no rows that keep an objective extremal; use level 'velocity', or a "
-                "solver that spends the objective through u0, such as 'projected-gradient'"
+                f"level {(name or self.name)!r} has no rows that keep an objective extremal; use level 'velocity', "
+                "or a solver that spends the objective through u0, such as 'projected-gradient'"
             )
         if self._damps and "reference" not in solver.honours:
             raise UnsupportedProblem(
