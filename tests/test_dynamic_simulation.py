@@ -92,6 +92,8 @@ def test_torques_of_ones_own_hold_a_pendulum():
     assert np.abs(motion.v[-1]).max() < 1e-3 and motion.torque.shape == (5000, 1)
     with pytest.raises(ShapeError, match="torque at t = 0 s"):
         cc.free_motion(robot, torque=lambda t, q, v: np.zeros(2))
+    with pytest.raises(ParameterError, match=r"torque\[0\] is 1e\+300"):
+        cc.free_motion(cc.load("planar2R"), torque=[1e300, 0.0])
     with pytest.raises(NonFiniteError, match="ran away"):
         cc.free_motion(robot, torque=[1e9], duration=1.0)
     with pytest.raises(UnderactuatedRobot):
