@@ -217,6 +217,15 @@ def test_friction_and_masses_that_the_model_lacks():
     np.testing.assert_array_equal(other.q, same.q)
 
 
+def test_a_factor_on_the_masses_is_not_one_on_the_payload():
+    robot, load = panda(), cc.Payload(2.0, com=[0.1, 0.0, 0.05], inertia=0.01 * np.eye(3))
+    real = cc.Plant(masses=1.5, payload=load).body(robot).robot
+    bare, held = robot.state(robot.home), robot.carrying(load).state(robot.home)
+    for name in ("mass_matrix", "gravity"):
+        a, b = getattr(bare, name), getattr(held, name)
+        np.testing.assert_allclose(getattr(real.state(robot.home), name), 1.5 * a + (b - a), atol=1e-12)
+
+
 def test_noise_is_of_its_size_and_comes_again():
     controller = torque_circle(dt=2e-3)
     runs = [cc.simulate(controller, duration=1.0, plant=cc.Plant(noise=0.5, seed=seed)) for seed in (3, 3, 4)]
