@@ -48,8 +48,12 @@ race: $(READY)  ## cartctl and its peers on the same jobs, each in an environmen
 soak: $(READY)  ## random problems and closed loops for MINUTES on all cores, every answer checked
 	@$(BIN)/python benchmarks/soak.py --minutes $(MINUTES)
 
+docs: $(READY)  ## the documentation site, build/site/index.html; warnings are errors, nothing is downloaded
+	@$(BIN)/python -m sphinx -q -E -b html -W --keep-going docs build/site
+	@echo build/site/index.html
+
 notebooks: $(READY)  ## execute the notebooks: their .ipynb from notebooks/source
 	@OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python notebooks/build.py
 
 clean:  ## remove the environment, caches and output
-	rm -rf $(VENV) out .pytest_cache .mypy_cache .ruff_cache .hypothesis build dist
+	rm -rf $(VENV) out .pytest_cache .mypy_cache .ruff_cache .hypothesis build dist docs/reference docs/lectures

@@ -1,10 +1,11 @@
 """What one step costs: medians in us, and as ratios against raw calls made in the same run.
 
-    python benchmarks/step_time.py            # print the table
-    python benchmarks/step_time.py --save     # and write benchmarks/results/step_time.csv and the table in the README
+    python benchmarks/step_time.py            # print the tables
+    python benchmarks/step_time.py --save     # and write step_time.csv and whole_steps.csv for the page of measurements
 
 Rounds of all candidates are interleaved, so that a machine that changes its pace changes it for all of them; the ratio
-is the median of the rounds' ratios against Pinocchio's computeFrameJacobian.
+is the median of the rounds' ratios against Pinocchio's computeFrameJacobian. The second table is that of
+:mod:`whole_steps`: steps one by one, along a motion.
 """
 
 from __future__ import annotations
@@ -16,11 +17,11 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 from harness import interleaved, ratios, save_rows, setting, show
+from whole_steps import measured as whole_steps
 
 import cartctl as cc
 
 RESULTS = Path(__file__).parent / "results" / "step_time.csv"
-README = Path(__file__).parent.parent / "README.md"
 REFERENCE = "pin.computeFrameJacobian"
 
 
@@ -50,26 +51,18 @@ def candidates() -> dict[str, Callable[[], object]]:
     return found
 
 
-def write_table(found: list[dict[str, str]], where: dict[str, str]) -> None:
-    """Put the figures into the README, between its markers."""
-    lines = ["| what | median us | x computeFrameJacobian |", "|---|---|---|"]
-    lines += [f"| {row['what']} | {row['median_us']} | {row['ratio']} |" for row in found]
-    lines += ["", "Panda, 7 dof, 6D pose; " + ", ".join(f"{k} {v}" for k, v in where.items()) + "."]
-    begin, end = "<!-- table: step_time -->\n", "<!-- /table -->"
-    head, _, rest = README.read_text().partition(begin)
-    README.write_text(head + begin + "\n".join(lines) + "\n" + end + rest.partition(end)[2])
-
-
 def main() -> None:
     """Measure, print and, if asked, save."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--save", action="store_true", help=f"write {RESULTS.name} and the README's table")
+    parser.add_argument("--save", action="store_true", help=f"write {RESULTS.name} and whole_steps.csv")
     save = parser.parse_args().save
     found = ratios(interleaved(candidates()), REFERENCE)
     show(f"One step on the Panda, 7 dof, 6D pose; ratio to {REFERENCE}", found)
+    whole = whole_steps()
+    show("Steps one by one, along a motion under limits, sns", whole)
     if save:
         save_rows(RESULTS, found, setting())
-        write_table(found, setting())
+        save_rows(RESULTS.with_name("whole_steps.csv"), whole, setting())
 
 
 if __name__ == "__main__":

@@ -27,6 +27,7 @@ _HOMES = {
         "Truncated",
     ),
     "cartctl.solvers": ("EquationSolver", "Solver", "solve", "solvers"),
+    "cartctl.solvers.citing": ("cite",),
     "cartctl.levels.metrics": ("JointLimitMetric",),
     "cartctl.solvers.dls_manipulability": ("DLSManipulability",),
     "cartctl.solvers.dls_sigma": ("DLSSigma",),
@@ -112,6 +113,7 @@ _HOMES = {
         "Start",
         "plan",
     ),
+    "cartctl.viewer": ("play",),
     "cartctl.paths": (
         "Circle",
         "Ellipse",
@@ -223,6 +225,7 @@ if TYPE_CHECKING:  # editors and mypy see what __getattr__ finds
     from cartctl.solvers import Solver as Solver
     from cartctl.solvers import solve as solve
     from cartctl.solvers import solvers as solvers
+    from cartctl.solvers.citing import cite as cite
     from cartctl.solvers.dls import DLS as DLS
     from cartctl.solvers.dls_manipulability import DLSManipulability as DLSManipulability
     from cartctl.solvers.dls_sigma import DLSSigma as DLSSigma
@@ -251,6 +254,7 @@ if TYPE_CHECKING:  # editors and mypy see what __getattr__ finds
     from cartctl.tasks import Reference as Reference
     from cartctl.tasks import RelativeFrameTask as RelativeFrameTask
     from cartctl.tasks import Task as Task
+    from cartctl.viewer import play as play
     from cartctl.wholepath import JointSpeed as JointSpeed
     from cartctl.wholepath import LocalMethod as LocalMethod
     from cartctl.wholepath import PathCost as PathCost

@@ -32,11 +32,12 @@ _FAST = {"reassoc", "contract", "nsz"}
 class Kernel(Generic[P, R]):
     """A function that compiles itself, for one signature, when it is first called or asked for."""
 
-    def __init__(self, function: Callable[P, R], signature: str, fast: bool, alone: bool) -> None:
+    def __init__(self, function: Callable[P, R], signature: str, fast: bool, alone: bool, lean: bool) -> None:
         self.function = function
         self.signature = signature
         self.fast = fast
         self.alone = alone
+        self.lean = lean
         self.__doc__ = function.__doc__
         self.__name__ = function.__name__
 
@@ -94,7 +95,8 @@ def part(function: Callable[P, R]) -> Part[P, R]:
 def lean_part(function: Callable[P, R]) -> Part[P, R]:
     """A :func:`part` that makes no arrays: those it is given outlive it, so it counts no references to them.
 
-    In a loop over small arrays, counting takes half the time.
+    In a loop over small arrays, counting takes half the time. One that returns views is for other lean ones alone: who
+    counts would give them back.
     """
     return Part(function, True)
 
@@ -131,15 +133,18 @@ def _deferred_interrupt() -> Iterator[None]:
             raise KeyboardInterrupt
 
 
-def kernel(signature: str, *, fast: bool = False, alone: bool = False) -> Callable[[Callable[P, R]], Kernel[P, R]]:
+def kernel(
+    signature: str, *, fast: bool = False, alone: bool = False, lean: bool = False
+) -> Callable[[Callable[P, R]], Kernel[P, R]]:
     """Mark a function as a kernel of the given signature, such as ``"bool(matrix, vector, float, out_vector)"``.
 
     ``vector`` and ``matrix`` are float64 arrays of any memory order, read-only ones included, ``ints`` an int64 array;
-    the kernel writes only to an ``out_`` argument. One signature means one compilation, at a time of the caller's
+    ``out_store`` and ``out_int_store`` are contiguous vectors, which kernels make views of. The kernel writes only to
+    an ``out_`` argument. One signature means one compilation, at a time of the caller's
     choosing. fast: sums may be reordered, as they may in every :func:`part`. alone: it lets go of the interpreter's
-    lock, so that several threads may run it at once.
+    lock, so that several threads may run it at once. lean: it is as a :func:`lean_part`.
     """
-    return lambda function: Kernel(function, signature, fast, alone)
+    return lambda function: Kernel(function, signature, fast, alone, lean)
 
 
 def _numba_type(name: str) -> Any:
@@ -149,6 +154,8 @@ def _numba_type(name: str) -> Any:
     bare = name.removeprefix("out_")
     if bare in arrays:
         return types.Array(*arrays[bare], "A", readonly=bare == name)
+    if name in ("out_store", "out_int_store"):
+        return types.Array(types.float64 if name == "out_store" else types.int64, 1, "C")
     return {"float": types.float64, "int": types.int64, "bool": types.boolean, "void": types.void}[name]
 
 
@@ -156,7 +163,12 @@ def _compile(kernel: Kernel[P, R]) -> Callable[P, R]:
     returned, _, arguments = kernel.signature.rstrip(")").partition("(")
     types = _numba_type(returned)(*(_numba_type(name.strip()) for name in arguments.split(",")))
     function = _with_parts(kernel.function)
-    options = {"error_model": "numpy", "fastmath": _FAST if kernel.fast else False, "nogil": kernel.alone}
+    options: dict[str, Any] = {
+        "error_model": "numpy",
+        "fastmath": _FAST if kernel.fast else False,
+        "nogil": kernel.alone,
+        "_nrt": not kernel.lean,
+    }
     folder = cache_folder(Path(function.__code__.co_filename))
     with _told_when_slow(folder):
         return _compiled_into(folder, types, options, function)  # type: ignore[no-any-return]

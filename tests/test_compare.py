@@ -26,7 +26,7 @@ from cartctl.report import Comparison
 from cartctl.report.comparison_page import comparison_page
 from cartctl.report.html import page
 from cartctl.report.palette import COLORS, color
-from tests.chromium import difference, needs_chromium, share, shoot
+from tests.chromium import Tab, difference, needs_chromium, share
 from tests.interruptions import interrupt_at
 from tests.report_runs import panda_run, planar_run
 from tests.test_html import HOSTILE, Reader, commands_of, tracks_of
@@ -334,40 +334,38 @@ def test_six_pandas_are_hardly_larger_than_one() -> None:
     assert alone < six < alone + 5e6 and six < 20e6
 
 
-def clicked(source: Path, target: Path, *boxes: int) -> Path:
-    """A copy of the page in which somebody clicks on the switches, the policy out of the way."""
-    text = re.sub(r"<meta http-equiv=\"Content-Security-Policy\"[^>]*>", "", source.read_text(encoding="utf-8"))
-    clicks = "".join(f"document.querySelector('[data-run=\"{k}\"]').click();" for k in boxes)
-    target.write_text(f"{text}<script>{clicks}</script>", encoding="utf-8")
-    return target
-
-
 @needs_chromium
 @pytest.mark.chromium
-def test_browser_draws_all_and_switches_each(planar_page: Path, tmp_path: Path) -> None:
+def test_browser_draws_all_and_switches_each(planar_page: Path, tab: Tab) -> None:
     scene = slice(0, 480)  # above the table
-    shown = shoot(planar_page, "#t=0.5", 800)
-    assert not shown.console and not shown.requests
+    shown = tab.look(planar_page, "#t=0.5")
     assert share(shown, (40, 80, 140), 40) > 0.003 and share(shown, (150, 60, 45), 40) > 0.003  # the solid links
     for box in (0, 1, 2):
-        without = shoot(clicked(planar_page, tmp_path / f"{box}.html", box), "#t=0.5", 800)
-        assert not without.console
-        assert difference(shown, without, scene) > 0.001, box
-    none = shoot(clicked(planar_page, tmp_path / "none.html", 0, 1, 2), "#t=0.5", 800)
-    assert share(none, (150, 60, 45), 40) < 1e-3
-    back = shoot(clicked(planar_page, tmp_path / "back.html", 1, 1), "#t=0.5", 800)
-    assert difference(shown, back, scene) < 1e-3
+        click(tab, box)
+        assert difference(shown, tab.picture(), scene) > 0.001, box
+        click(tab, box)
+    assert difference(shown, tab.picture(), scene) < 1e-3
+    click(tab, 0, 1, 2)
+    assert share(tab.picture(), (150, 60, 45), 40) < 1e-3
+    assert not tab.console and not tab.requests
 
 
 @needs_chromium
 @pytest.mark.chromium
 @pytest.mark.parametrize("size", [(1280, 800), (412, 800)])
-def test_browser_plays_the_robots_above_the_table(planar_page: Path, size: tuple[int, int]) -> None:
-    first, second = (shoot(planar_page, f"#t={t}", 600, size) for t in (0.1, 0.5))
-    assert not second.console
+def test_browser_plays_the_robots_above_the_table(planar_page: Path, size: tuple[int, int], tab: Tab) -> None:
+    first, second = (tab.look(planar_page, f"#t={t}", size) for t in (0.1, 0.5))
+    assert not tab.console and not tab.requests
     assert difference(first, second, slice(60, 400)) > 0.005
-    bottom = first.pixels[-12:, :, :].astype(int)
-    assert (bottom.min(axis=2) > 235).mean() > 0.8  # the table, on white
+    stage, table = (tab.ask(f"document.getElementById('{name}').getBoundingClientRect().{side}")
+                    for name, side in (("stage", "bottom"), ("runs", "top")))  # fmt: skip
+    assert stage == table
+
+
+def click(tab: Tab, *boxes: int) -> None:
+    """Click the switches of some runs."""
+    for box in boxes:
+        tab.ask(f"document.querySelector('[data-run=\"{box}\"]').click()")
 
 
 # --- the verb --------------------------------------------------------------------------------------------------------

@@ -1,4 +1,4 @@
-"""The README and the guide say what is true: their Python runs, their files exist, their figures come from a file."""
+"""The README and the site's pages say what is true: Python runs, files exist, figures are a file's."""
 
 from __future__ import annotations
 
@@ -11,7 +11,12 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parent.parent
-PAGES = ["README.md", "docs/guide.md"]
+GENERATED = {
+    ROOT / "docs" / "reference",
+    ROOT / "docs" / "lectures",
+}  # when the site is built, from what is tested elsewhere
+DOCS = [str(p.relative_to(ROOT)) for p in sorted(ROOT.glob("docs/**/*.md")) if p.parent not in GENERATED]
+PAGES = ["README.md", *DOCS]
 SNIPPETS = [
     (p, i, s)
     for p in PAGES
@@ -28,24 +33,41 @@ def test_snippets_run(page: str, number: int, code: str, tmp_path: Path) -> None
     assert done.returncode == 0, done.stderr
 
 
-@pytest.mark.parametrize(
-    "page", [str(p.relative_to(ROOT)) for p in sorted(ROOT.glob("*.md")) + sorted(ROOT.glob("docs/*.md"))]
-)
+@pytest.mark.parametrize("page", [*(str(p.relative_to(ROOT)) for p in sorted(ROOT.glob("*.md"))), *DOCS])
 def test_links_lead_somewhere(page: str) -> None:
-    for link in re.findall(r"\]\(([^)#]+)\)", (ROOT / page).read_text()):
-        if not link.startswith("http"):
+    for link in re.findall(r"\]\(([^)#\s]+)(?:#[\w-]+)?\)", (ROOT / page).read_text()):
+        if "://" not in link:
             assert ((ROOT / page).parent / link).exists(), f"{page}: {link}"
+        else:
+            assert re.fullmatch(r"https://[a-z0-9-]+(\.[a-z0-9-]+)+(/[\w.~%/+-]*)?", link), f"{page}: {link}"
 
 
-def test_the_readmes_times_are_the_files() -> None:
-    text = (ROOT / "README.md").read_text()
-    table = re.search(r"<!-- table: step_time -->\n(.*?)<!-- /table -->", text, re.DOTALL)
-    assert table is not None
-    with (ROOT / "benchmarks/results/step_time.csv").open() as file:
-        rows = list(csv.DictReader(file))
-    expected = [f"| {r['what']} | {r['median_us']} | {r['ratio']} |" for r in rows]
-    assert [line for line in table[1].splitlines() if line.startswith("| ")][1:] == expected
-    assert rows[0]["pin"] in table[1] and rows[0]["date"] in table[1]
+def result(name: str, **where: str) -> dict[str, str]:
+    with (ROOT / "benchmarks" / "results" / name).open() as file:
+        (row,) = [r for r in csv.DictReader(file) if all(r[key] == value for key, value in where.items())]
+    return row
+
+
+def test_the_readmes_race_is_the_files() -> None:
+    """Each figure as the file has it, rounded as the sentence has it."""
+    text = " ".join((ROOT / "README.md").read_text().split())
+    said = re.search(r"<!-- race -->(.*?)<!-- /race -->", text)
+    assert said is not None
+    tracks = ("cartctl simulate_batch", "placo", "cartctl Controller.step", "pink")
+    race = {who: result("race.csv", job="track", who=who) for who in tracks}
+    race |= {
+        who: result("race.csv", job="ik", who=who) for who in ("cartctl inverse_kinematics", "roboticstoolbox ik_LM")
+    }
+    us = {who: float(row["median_us"]) for who, row in race.items()}
+    um = {who: float(row["error"].split()[0]) for who, row in race.items() if row["job"] == "track"}
+    for words in (
+        f"`cc.simulate_batch` {us['cartctl simulate_batch']:.1f}, placo {us['placo']:.1f}",
+        f"`Controller.step` {us['cartctl Controller.step']:.0f}, pink {us['pink']:.0f};",
+        f"({um['placo']:.1f} and {um['pink']:.2f} um against {um['cartctl simulate_batch']:.0f})",
+        f"{us['cartctl inverse_kinematics']:.1f} us and {race['cartctl inverse_kinematics']['success']} found",
+        f"{us['roboticstoolbox ik_LM']:.0f} us and {race['roboticstoolbox ik_LM']['success']}.",
+    ):
+        assert words in said[1], words
 
 
 def test_the_readmes_comparison_is_the_files() -> None:
@@ -60,7 +82,7 @@ def test_the_readmes_comparison_is_the_files() -> None:
     assert rows[0]["pin"] in table[1] and rows[0]["date"] in table[1]
 
 
-def test_ten_thousand_runs_fit_a_gibibyte_as_the_guide_says() -> None:
+def test_ten_thousand_runs_fit_a_gibibyte_as_the_page_says() -> None:
     with (ROOT / "benchmarks/results/bench_memory.csv").open() as file:
         rows = {row["workers"]: row for row in csv.DictReader(file)}
     assert set(rows) == {"1", "2"} and all(row["runs"] == "10000" for row in rows.values())
@@ -68,7 +90,7 @@ def test_ten_thousand_runs_fit_a_gibibyte_as_the_guide_says() -> None:
     grown = [int(row["all_MiB"]) - int(row["all_MiB_at_a_tenth"]) for row in rows.values()]
     assert max(grown) < 100  # for nine times as many runs: what writing the table takes
     said = f"{rows['1']['all_MiB']} MiB alone, {rows['2']['all_MiB']} MiB with two workers"
-    assert said in " ".join((ROOT / "docs/guide.md").read_text().split())
+    assert said in " ".join((ROOT / "docs/how-to/bench.md").read_text().split())
 
 
 def test_every_target_of_the_makefile_in_the_readme_exists() -> None:
@@ -81,3 +103,34 @@ def test_the_number_of_robots_is_right() -> None:
     import cartctl as cc
 
     assert f"lists {len(cc.robots())} by name" in (ROOT / "README.md").read_text()
+
+
+def shell_lines() -> list[tuple[str, str]]:
+    """Every line that a page tells a reader to type into a shell, without its comment."""
+    found = []
+    for page in PAGES:
+        text = (ROOT / page).read_text()
+        lines = [line for block in re.findall(r"```sh\n(.*?)```", text, re.DOTALL) for line in block.splitlines()]
+        lines += re.findall(r"`((?:cartctl|python) [^`]+)`", text)
+        found += [(page, line.partition("#")[0].strip()) for line in lines if line.startswith(("cartctl", "python"))]
+    return sorted(set(found))
+
+
+@pytest.mark.parametrize(("page", "line"), shell_lines())
+def test_what_a_page_says_to_type_exists(page: str, line: str) -> None:
+    """Verbs and their options are those of the command line, scripts are files."""
+    import typer
+
+    from cartctl.cli.app import app
+
+    words = line.partition(">>")[0].split()
+    if words[0] == "python":
+        assert (ROOT / words[1]).is_file()
+        return
+    command = typer.main.get_command(app)
+    while len(words) > 1 and words[1] in getattr(command, "commands", {}):
+        command, words = command.commands[words[1]], words[1:]
+    assert not getattr(command, "commands", None) or len(words) == 1 or words[1].isupper(), f"no verb {words[1:2]}"
+    options = {name for parameter in command.params for name in (*parameter.opts, *parameter.secondary_opts)}
+    unknown = [word for word in words[1:] if word.startswith("--") and word not in {*options, "--help"}]
+    assert not unknown

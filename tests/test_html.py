@@ -22,7 +22,7 @@ import zmq
 from cartctl.errors import ParameterError
 from cartctl.report import write_html
 from cartctl.report.html import page, quantity
-from tests.chromium import difference, needs_chromium, share, shoot
+from tests.chromium import Tab, difference, needs_chromium, share, shoot
 from tests.report_runs import panda_run, planar_run, robot_of, run_of
 
 HOSTILE = '</script><script>document.title="pwned"</script><img src=x onerror=alert(1)>&amp;"\'--><b>ü$title{}'
@@ -256,8 +256,8 @@ def test_policy_allows_these_scripts_and_no_request(planar_page: Path) -> None:
 
 @needs_chromium
 @pytest.mark.chromium
-def test_browser_draws_the_robot_and_moves_it(planar_page: Path) -> None:
-    early, late = shoot(planar_page, "#t=0.05", 600), shoot(planar_page, "#t=0.5", 600)
+def test_browser_draws_the_robot_and_moves_it(planar_page: Path, tab: Tab) -> None:
+    early, late = tab.look(planar_page, "#t=0.05"), tab.look(planar_page, "#t=0.5")
     for shot in (early, late):
         assert not shot.console and not shot.requests
         assert share(shot, BLUE, 40) > 0.01 and share(shot, RED, 40) > 0.01  # both links
@@ -265,22 +265,25 @@ def test_browser_draws_the_robot_and_moves_it(planar_page: Path) -> None:
     middle = slice(100, 700)  # without the player's moving slider
     assert difference(early, late, middle) > 0.01
     assert share(late, (0, 114, 178)) > share(early, (0, 114, 178)) + 2e-4  # the actual path has grown
-    again = shoot(planar_page, "#t=0.5", 900)
+    again = shoot(planar_page, "#t=0.5", 900)  # in a browser of its own
     assert difference(late, again, middle) < 1e-3  # a moment in the address stands still
 
 
 @needs_chromium
 @pytest.mark.chromium
-def test_browser_plays_by_itself(planar_page: Path) -> None:
-    first, second = (shoot(planar_page, "", ms, (480, 360)) for ms in (250, 600))
-    assert not first.console and not second.console
-    assert difference(first, second, slice(110, 290)) > 0.01
+def test_browser_plays_by_itself(planar_page: Path, tab: Tab) -> None:
+    first = tab.look(planar_page, "", (1000, 400))
+    began = tab.ask("Number(document.getElementById('time').value)")
+    tab.until(f"Math.abs(Number(document.getElementById('time').value) - {began}) > 0.2")
+    second = tab.picture()
+    assert not second.console and not second.requests
+    assert difference(first, second, slice(20, 320), slice(0, 560)) > 0.01
 
 
 @needs_chromium
 @pytest.mark.chromium
-def test_browser_fits_the_robot_into_a_phone(planar_page: Path) -> None:
-    shot = shoot(planar_page, "#t=0.5", 600, (412, 800))
+def test_browser_fits_the_robot_into_a_phone(planar_page: Path, tab: Tab) -> None:
+    shot = tab.look(planar_page, "#t=0.5", (412, 800))
     assert share(shot, BLUE, 40) > 0.005 and share(shot, RED, 40) > 0.005
     edge = np.concatenate([shot.pixels[:, :6], shot.pixels[:, -6:]], axis=1)
     assert not (np.abs(edge.astype(int) - RED).max(axis=2) <= 40).any()
@@ -288,8 +291,8 @@ def test_browser_fits_the_robot_into_a_phone(planar_page: Path) -> None:
 
 @needs_chromium
 @pytest.mark.chromium
-def test_browser_shows_the_panda(panda_page: Path) -> None:
-    shot = shoot(panda_page, "#t=1.3", 600)
+def test_browser_shows_the_panda(panda_page: Path, tab: Tab) -> None:
+    shot = tab.look(panda_page, "#t=1.3")
     assert not shot.console and not shot.requests
     middle = shot.pixels[60:640, 440:900].astype(int)
     light = (middle.min(axis=2) > 170) & (np.ptp(middle, axis=2) < 6)  # its covers are white, the background is blueish
@@ -300,10 +303,10 @@ def test_browser_shows_the_panda(panda_page: Path) -> None:
 
 @needs_chromium
 @pytest.mark.chromium
-def test_hostile_names_do_nothing_in_a_browser(tmp_path: Path) -> None:
+def test_hostile_names_do_nothing_in_a_browser(tmp_path: Path, tab: Tab) -> None:
     run = planar_run(HOSTILE)
     run.tasks[0].name = HOSTILE
-    shot = shoot(write_html(run, tmp_path / "run.html"), "#t=0.5", 600)
+    shot = tab.look(write_html(run, tmp_path / "run.html"), "#t=0.5")
     assert not shot.console and not shot.requests and share(shot, RED, 40) > 0.01
 
 

@@ -46,8 +46,9 @@ MAY_IMPORT = {
     "calibration": JOINED | {"files"},
     "wholepath": JOINED | {"files", "motion"},
     "report": JOINED | {"files", "motion", "calibration", "wholepath"},
+    "viewer": JOINED | {"motion", "report"},
     "bench": JOINED | {"files", "motion", "report"},
-    "cli": JOINED | {"analysis", "bench", "calibration", "files", "motion", "wholepath", "report"},
+    "cli": JOINED | {"viewer", "analysis", "bench", "calibration", "files", "motion", "wholepath", "report"},
     "__main__": {"cli"},
 }
 # The named exceptions: Run.plot and Run.html, PlanReport.plot.

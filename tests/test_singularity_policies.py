@@ -259,7 +259,7 @@ def test_every_solver_takes_every_policy_at_a_singularity(solver: str, policy: s
 def test_far_from_singularities_nothing_changes(policy: str, solver: str) -> None:
     q = folded(0.8)
     guarded, plain = (made(solver, p, path_clock=False).step(q) for p in (policy, None))
-    np.testing.assert_array_equal(guarded.velocity, plain.velocity)
+    np.testing.assert_allclose(guarded.velocity, plain.velocity, rtol=1e-12)  # the plain one is taken at one stroke
     assert guarded.solution.status is plain.solution.status is cc.Status.OPTIMAL
 
 

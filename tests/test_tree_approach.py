@@ -8,13 +8,14 @@ import pytest
 import cartctl as cc
 from cartctl.compiled.approach import TreeApproach
 from cartctl.levels.approach import Approach
+from tests.ways import General
 
 SAME = 1e-12
 
 
 def pair(robot: cc.Robot, tasks: list[cc.Task], **given) -> tuple[cc.Controller, cc.Controller]:
     """The controller as it is made, and one whose approach asks Pinocchio."""
-    ours, theirs = (cc.Controller(robot, tasks, solver="sns", **given) for _ in range(2))
+    ours, theirs = (General(robot, tasks, solver="sns", **given) for _ in range(2))
     assert type(ours._confining._approach) is TreeApproach
     theirs._confining._approach = Approach(robot.limits, theirs.dt, theirs.solver, theirs._waiting)
     return ours, theirs

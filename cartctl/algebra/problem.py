@@ -33,6 +33,11 @@ class Equation:
     which are zero up to round-off are never inverted.
 
     Raises ShapeError, NonFiniteError, ParameterError.
+
+    >>> import cartctl as cc
+    >>> hand = cc.Equation([[1.0, 1.0, 0.0]], [0.5], drift=[0.1], name="hand")
+    >>> hand.rhs
+    array([0.4])
     """
 
     A: FloatArray
@@ -97,6 +102,12 @@ class Inequality:
     for solvers that honour it (``hqp``); hard rows that outrank every equation are the Problem's ``constraints``.
 
     Raises ShapeError, NonFiniteError, ProblemError.
+
+    >>> import cartctl as cc
+    >>> stay = cc.Inequality([[1.0, 0.0]], lower=[-0.1], upper=[0.1])
+    >>> solution = cc.solve(cc.Problem([stay, ([[1.0, 0.0]], [0.5])]), "hqp")
+    >>> print(solution.u.round(6), solution.status)
+    [0.1 0. ] INEXACT
     """
 
     A: FloatArray
@@ -133,6 +144,15 @@ class Problem:
     reference: u0 (n,); None is zero.
 
     Raises ShapeError, NonFiniteError, MetricError, ProblemError (no equations, crossed bounds).
+
+    >>> import cartctl as cc
+    >>> problem = cc.Problem([([[1.0, 1.0, 0.0]], [1.5])], lower=[-1, -0.5, -1], upper=[1, 0.5, 1])
+    >>> problem.n, problem.bounded
+    (3, True)
+    >>> print(cc.solve(problem.without_bounds(), "pinv").u)
+    [0.75 0.75 0.  ]
+    >>> print(cc.solve(problem, "sns").u)
+    [1.  0.5 0. ]
     """
 
     equations: tuple[Equation, ...]

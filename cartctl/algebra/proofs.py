@@ -94,7 +94,7 @@ def check_proofs(
                 added = max(added, _turn(own, z[j], x, low, high, level, holder, j, span))
         rest, terms = _stationarity(A, C, own, span, n, force, k == p)
         terms = max(terms, added)
-        slack, value, slope, total = _value(own, x, low, high, level, b, k, span)
+        slack, value, slope, total, unsure = _value(own, x, low, high, level, b, k, span)
         if k == p:
             terms = max(terms, _COARSE * pull, least)
         elif fits[k] != SCALED:
@@ -109,7 +109,7 @@ def check_proofs(
         elif scales[k] != scales[k]:
             at_zero = value - slope
             margin = min(value, at_zero)
-            residuals[k, GAP] = 0.0 if margin > _CLEAR * total else 1.0
+            residuals[k, GAP] = 0.0 if margin > _CLEAR * total + unsure else 1.0
         elif scales[k] < 1.0:
             residuals[k, GAP] = abs(value) / slope if slope > 0.0 else np.inf
 
@@ -313,9 +313,12 @@ def _value(
     b: FloatArray,
     k: int,
     span: FloatArray,
-) -> tuple[float, float, float, float]:
-    """Complementarity ``sum |z_i| slack_i``, h at the present scale (1 if skipped), its slope and terms."""
-    slack, value, slope, total, most = 0.0, 0.0, 0.0, 0.0, _largest(own, span)
+) -> tuple[float, float, float, float, float]:
+    """Complementarity ``sum |z_i| slack_i``, h at the present scale (1 if skipped), its slope and terms.
+
+    Last, what of h is due to rows of levels above that are met only so well.
+    """
+    slack, value, slope, total, unsure, most = 0.0, 0.0, 0.0, 0.0, 0.0, _largest(own, span)
     for i in range(x.shape[0]):
         if own[i] == 0.0:
             continue
@@ -328,6 +331,8 @@ def _value(
             side = low[i] if level[i] < 0 else x[i]
             value += own[i] * side
             total += abs(own[i] * side)
+            if low[i] == high[i]:
+                unsure += abs(own[i] * (x[i] - low[i]))
             continue
         if level[i] == k:
             continue
@@ -339,7 +344,7 @@ def _value(
         slack += abs(own[i] * (x[i] - bound))
         value += own[i] * bound
         total += abs(own[i] * bound)
-    return slack, value, slope, total
+    return slack, value, slope, total, unsure
 
 
 @part

@@ -80,6 +80,13 @@ class Solution:
     u: (n,). scales: (p,) in [0, 1], 1 where the method does not scale, nan where a task was skipped. saturated: (n,) -1
     at the lower bound, +1 at the upper, 0 free; saturated_rows the same for constraint rows. lost_rank: whether a task
     lost rank. The status, residuals, parts, multipliers and certificate are worked out when asked for.
+
+    >>> import cartctl as cc
+    >>> solution = cc.solve(cc.Problem([([[1.0, 1.0]], [4.0])], lower=[-1, -1], upper=[1, 1]), "sns")
+    >>> print(solution.u, solution.scales, solution.saturated, solution.status)
+    [1. 1.] [0.5] [1 1] SCALED
+    >>> solution.certificate().holds(1e-9)
+    True
     """
 
     __slots__ = (

@@ -62,6 +62,11 @@ def spectrum(A: Any, tolerance: float | None = None) -> Spectrum:
     """All that the singular values of A (m, n) say; raises ShapeError, NonFiniteError, ParameterError.
 
     tolerance: singular values of at most tolerance times the Frobenius norm of A are zero; None is round-off.
+
+    >>> from cartctl import analysis
+    >>> found = analysis.spectrum([[1.0, 0.0, 0.0], [0.0, 0.5, 0.0]])
+    >>> found.rank, found.nullity, found.condition
+    (2, 1, 2.0)
     """
     matrix = checks.matrix("A", A)
     values = svd.singular_values(matrix)

@@ -37,6 +37,11 @@ class DHChain(Chain):
     ``theta``, ``beta``, ``offsets`` (theta of R, d of P joints), ``lengths`` (a and d), ``table``, ``base``, ``tool``.
 
     Raises ShapeError, NonFiniteError, ParameterError.
+
+    >>> import cartctl as cc
+    >>> arm = cc.DHChain(a=[1.0, 0.5], alpha=[0, 0], d=[0, 0])
+    >>> print(arm.poses([[0.0, 0.0]])[0, :3, 3])
+    [1.5 0.  0. ]
     """
 
     a: Any

@@ -9,10 +9,12 @@ import typer
 from cartctl import __version__
 from cartctl.cli.bench import app as bench
 from cartctl.cli.calibrate import calibrate
+from cartctl.cli.cite import cite
 from cartctl.cli.compare import compare
 from cartctl.cli.doctor import doctor
 from cartctl.cli.info import info
 from cartctl.cli.plan import plan
+from cartctl.cli.play import play
 from cartctl.cli.track import track
 
 _EXAMPLE = "Example:  cartctl track panda --open"
@@ -60,5 +62,9 @@ app.command(
     epilog="Example:  cartctl plan panda --closed --free-start --open\n\n"
     "Example:  cartctl plan lwr --objective joint-speed --path polygon --samples 300"
 )(plan)
+app.command(epilog="Example:  cartctl play panda\n\nExample:  cartctl play my_robot.urdf --solver hqp --level torque")(
+    play
+)
 app.command(epilog="Example:  cartctl info panda")(info)
+app.command(epilog="Example:  cartctl cite sns >> paper.bib")(cite)
 app.command(epilog="Example:  cartctl doctor")(doctor)

@@ -11,13 +11,12 @@ from cartctl import checks
 from cartctl.cli.choices import SINGULARITIES, choice, posture
 from cartctl.cli.console import say
 from cartctl.cli.hand import Hand
-from cartctl.cli.method import limit_options
+from cartctl.cli.method import TORQUE_METRIC, limit_options, metric_of
 from cartctl.cli.shapes import Shape
 from cartctl.errors import ParameterError
 from cartctl.model.axes import pose_rows
 
 _SETTLE = 0.5  # s after the path's end
-_TORQUE_METRIC = "inverse-inertia"
 _SOFT_START = 0.5  # s in which the objective rises, so that the rates do not jump
 
 
@@ -31,6 +30,16 @@ class Place:
     home: Sequence[str] | None
     frame: str | None
     axes: str | None
+
+    def hand(self) -> Hand:
+        """The robot, loaded, and the frame of it; raises what :func:`cartctl.load` raises."""
+        robot = cc.load(
+            self.robot,
+            package_dirs=self.package_dirs or (),
+            root_joint=self.root_joint,
+            home=posture(self.home or ()),
+        )
+        return Hand(robot, robot.tool if self.frame is None else self.frame)
 
 
 @dataclass(frozen=True)
@@ -66,13 +75,8 @@ class Course:
     """
 
     def __init__(self, place: Place, way: Way, pace: Pace) -> None:
-        self.robot = cc.load(
-            place.robot,
-            package_dirs=place.package_dirs or (),
-            root_joint=place.root_joint,
-            home=posture(place.home or ()),
-        )
-        self.hand = Hand(self.robot, self.robot.tool if place.frame is None else place.frame)
+        self.hand = place.hand()
+        self.robot = self.hand.robot
         self.axes = self.hand.axes if place.axes is None else place.axes
         if all(row >= 3 for row in pose_rows(self.axes)):
             raise ParameterError(
@@ -92,15 +96,10 @@ class Course:
         """The loop that follows it; raises as :class:`cartctl.Controller`."""
         pace = self._pace
         return cc.Controller(
-            self.robot, self.task, solver, pace.level, objective=objective, metric=self._metric(solver), dt=pace.dt,
+            self.robot, self.task, solver, pace.level, objective=objective,
+            metric=metric_of(solver, pace.level, pace.metric), dt=pace.dt,
             soft_start=_SOFT_START, singularity=pace.singularity, **limit_options(solver, pace.level),
         )  # fmt: skip
-
-    def _metric(self, solver: cc.Solver) -> str | None:
-        """The one asked for; of torques, the dynamically consistent one where the solver takes any."""
-        if self._pace.metric is not None or self._pace.level != "torque":
-            return self._pace.metric
-        return _TORQUE_METRIC if solver.takes_metric else None
 
     def facts(self) -> list[tuple[str, str]]:
         """What it is, defaults included."""
@@ -114,7 +113,7 @@ class Course:
 
     def pace(self) -> str:
         """Level, metric, gain, step, and the policy near singularities."""
-        weighed = self._pace.metric or (_TORQUE_METRIC if self._pace.level == "torque" else None)
+        weighed = self._pace.metric or (TORQUE_METRIC if self._pace.level == "torque" else None)
         metric = f", metric {weighed}" if weighed else ""
         near = f", near a singularity: {self._pace.singularity}" if self._pace.singularity else ""
         return f"{self._pace.level} level{metric}, gain {self.task.gain:g} 1/s, step {1e3 * self._pace.dt:g} ms{near}"

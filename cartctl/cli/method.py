@@ -14,6 +14,8 @@ from cartctl.objectives import Objective
 from cartctl.objectives.named import KNOWN, in_words
 from cartctl.solvers import Solver, solver_class, solvers
 
+TORQUE_METRIC = "inverse-inertia"
+
 
 class Purpose(NamedTuple):
     """What the redundancy is spent on, and that in words."""
@@ -90,6 +92,13 @@ def spends_redundancy(solver: Solver | type[Solver]) -> bool:
 def limit_options(solver: Solver, level: str) -> dict[str, Any]:
     """What to tell the controller: off where solver or level honours none, which the header then says."""
     return {} if "bounds" in solver.honours and get_level(level).bounds is not None else {"limits": None}
+
+
+def metric_of(solver: Solver, level: str, asked: str | None) -> str | None:
+    """The one asked for; of torques, the dynamically consistent one where the solver takes any."""
+    if asked is not None or level != "torque":
+        return asked
+    return TORQUE_METRIC if solver.takes_metric else None
 
 
 def has_damping(name: str) -> bool:

@@ -169,6 +169,15 @@ Closed = Annotated[bool, typer.Option("--closed", rich_help_panel=_METHOD, help=
 FreeStart = Annotated[
     bool, typer.Option("--free-start", rich_help_panel=_METHOD, help="Start in the best posture instead of home.")
 ]
+Port = Annotated[
+    int | None,
+    typer.Option(
+        "--port", metavar="N", min=0, max=65535, rich_help_panel=_RESULT,
+        help="Of the page, on this machine only; by default 8080 or the next one that is free.",
+    ),
+]  # fmt: skip
+NoOpen = Annotated[bool, typer.Option("--no-open", rich_help_panel=_RESULT, help="Do not open a browser.")]
+Stay = Annotated[bool, typer.Option("--stay", rich_help_panel=_RESULT, help="Go on when the last browser has closed.")]
 Unlimited = Annotated[
     bool, typer.Option("--no-limits", rich_help_panel=_METHOD, help="Leave the joints' limits out of account.")
 ]

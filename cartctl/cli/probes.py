@@ -35,6 +35,7 @@ PACKAGES = {
     "platformdirs": ("platformdirs", "4"),
     "example-robot-data": ("", "6.0"),
 }
+VISER = "1.1.1"  # the oldest version that will do; only the extra ``play`` brings it
 _THREADS = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS")
 _BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome")
 
@@ -50,7 +51,7 @@ class Finding(NamedTuple):
 
 def findings() -> list[Finding]:
     """Everything there is to say about this installation."""
-    checks: tuple[Callable[[], Finding], ...] = (_robots, _shared_robots, _kernels, _cache, _blas, _browser)
+    checks: tuple[Callable[[], Finding], ...] = (_robots, _shared_robots, _kernels, _cache, _blas, _browser, _viser)
     return [_python(), _own(), *_packages(), *(_guarded(check) for check in checks)]
 
 
@@ -146,6 +147,20 @@ def _blas() -> Finding:
     given = [f"{name}={os.environ[name]}" for name in _THREADS if name in os.environ]
     threads = ", ".join(given) or f"threads not limited, {os.cpu_count()} cores"
     return Finding("ok", "BLAS", f"{blas.get('name')} {blas.get('version')}, {threads}")
+
+
+def _viser() -> Finding:
+    remedy = "pip install 'cartctl[play]'"
+    try:
+        version = metadata.version("viser")
+    except metadata.PackageNotFoundError:
+        return Finding("note", "viser", "not installed; only `cartctl play` wants it", remedy)
+    reason = try_imports(["viser"])["viser"].reason
+    if reason or _numbers(version) < _numbers(VISER):
+        return Finding(
+            "note", "viser", f"{version}, {reason or f'expected {VISER} or later'}; `cartctl play` wants it", remedy
+        )
+    return Finding("ok", "viser", version)
 
 
 def _browser() -> Finding:

@@ -39,7 +39,11 @@ class TreeApproach(Approach):
         super().__init__(limits, dt, solver, waiting)
         self._tree = tree
         self._known: dict[int, tuple[Task, _Rows | None]] = {}
-        self._curvatures_kernel, self._drift_kernel = curvatures.compiled, drift_of.compiled
+
+    def prepare(self) -> None:
+        """Compile ahead what the first step would otherwise wait for."""
+        super().prepare()
+        _ = curvatures.compiled, drift_of.compiled
 
     def _curvatures(
         self, task: Task, state: State, U: FloatArray, Vt: FloatArray, D: FloatArray, error: FloatArray
@@ -48,14 +52,14 @@ class TreeApproach(Approach):
         if rows is None:
             super()._curvatures(task, state, U, Vt, D, error)
         else:
-            self._curvatures_kernel(self._tree.joints, *rows, state.q, U, Vt, error, D)
+            curvatures.compiled(self._tree.joints, *rows, state.q, U, Vt, error, D)
 
     def _drift(self, task: Task, state: State, v: FloatArray) -> FloatArray:
         rows = self._rows(task)
         if rows is None:
             return super()._drift(task, state, v)
         out = np.empty(rows.row.shape[0])
-        self._drift_kernel(self._tree.joints, *rows, state.q, v, out)
+        drift_of.compiled(self._tree.joints, *rows, state.q, v, out)
         return out
 
     def _rows(self, task: Task) -> _Rows | None:

@@ -39,6 +39,7 @@ _WANTED = 1e-3  # as in levels.left_out
 _STILL = 2  # row of the joints' array: a bound this close to zero blocks
 _SWEEPS = 12
 _LEVEL = 2e-16  # of the Jacobian's size squared: the round-off in its squares
+_SLIGHT = 5e-5  # radians: below this, what series leave out is less than round-off
 _SQUARED = 4e-4  # of the Jacobian's size squared: below this, squares would lose too many digits
 
 
@@ -79,12 +80,8 @@ def _turned(J: FloatArray, turn: FloatArray, room: Room) -> bool:
     """
     m, n = J.shape
     G, W, s, size = room.G, room.W, room.s, 0.0
+    _times(J, turn, W)
     for i in range(m):
-        for k in range(n):
-            total = 0.0
-            for a in range(m):
-                total += turn[a, i] * J[a, k]
-            W[i, k] = total
         for j in range(i + 1):
             total = 0.0
             for k in range(n):
@@ -101,9 +98,15 @@ def _turned(J: FloatArray, turn: FloatArray, room: Room) -> bool:
                 if abs(g) <= _LEVEL * size:
                     continue
                 settled = False
-                tau = 0.5 * (G[q, q] - G[p, p]) / g
-                t = (1.0 if tau >= 0.0 else -1.0) / (abs(tau) + sqrt(1.0 + tau * tau))
-                c = 1.0 / sqrt(1.0 + t * t)
+                apart = G[q, q] - G[p, p]
+                if abs(g) < _SLIGHT * abs(apart):  # as nearly always: the tangent's and the cosine's series
+                    x = g / apart
+                    t = x * (1.0 - x * x)
+                    c = 1.0 - 0.5 * t * t
+                else:
+                    tau = 0.5 * apart / g
+                    t = (1.0 if tau >= 0.0 else -1.0) / (abs(tau) + sqrt(1.0 + tau * tau))
+                    c = 1.0 / sqrt(1.0 + t * t)
                 d = t * c
                 G[p, p] -= t * g
                 G[q, q] += t * g
@@ -133,7 +136,21 @@ def _turned(J: FloatArray, turn: FloatArray, room: Room) -> bool:
             s[i], s[best] = s[best], s[i]
             for k in range(m):
                 turn[k, i], turn[k, best] = turn[k, best], turn[k, i]
+    _times(J, turn, W)
     return settled
+
+
+@lean_part
+def _times(J: FloatArray, turn: FloatArray, W: FloatArray) -> None:
+    """Fill W (m, n) with ``U^T J``."""
+    m, n = J.shape
+    for i in range(m):
+        for k in range(n):
+            W[i, k] = turn[0, i] * J[0, k]
+        for a in range(1, m):
+            share = turn[a, i]
+            for k in range(n):
+                W[i, k] += share * J[a, k]
 
 
 @lean_part
@@ -158,7 +175,7 @@ def _directions(
     if not _turned(J, turn, room):
         _straight(turn)
         return False
-    if not _left_out(J, b, joints, lower, upper, size, turn, room):
+    if not _left_out(J, b, joints, lower, upper, size, rate.shape[0] > 0, turn, room):
         _fill(J, b, rate, error, joints, dt, size, turn, room)
         return True
     if not _turned(room.A[:m], other, room):
@@ -183,11 +200,12 @@ def _left_out(
     lower: FloatArray,
     upper: FloatArray,
     size: float,
+    moving: bool,
     turn: FloatArray,
     room: Room,
 ) -> bool:
     """Fill room.A with J less the joints that :mod:`cartctl.levels.left_out` leaves out: whether there is any."""
-    (m, n), s, wanted, found = J.shape, room.s, room.x, False
+    (m, n), s, W, wanted, found = J.shape, room.s, room.W, room.x, False
     for j in range(n):
         wanted[j] = 0.0
     for k in range(m):
@@ -196,18 +214,21 @@ def _left_out(
             total += turn[i, k] * b[i]
         total /= s[k] * s[k] + (_WANTED * size) ** 2
         for j in range(n):
-            x = 0.0
-            for i in range(m):
-                x += turn[i, k] * J[i, j]
-            wanted[j] += x * total
+            wanted[j] += W[k, j] * total
     for j in range(n):
         out = False
         if lower.shape[0] > 0:
             still = joints[_STILL, j]
-            out = (wanted[j] > 0.0 and upper[j] <= still) or (wanted[j] < 0.0 and lower[j] >= -still)
-        found = found or out
-        for i in range(m):
-            room.A[i, j] = 0.0 if out else J[i, j]
+            beyond = upper[j] if wanted[j] > 0.0 else -lower[j]
+            out = wanted[j] != 0.0 and beyond <= still and (beyond >= -still or not moving)
+        if out and not found:
+            found = True
+            for i in range(m):
+                for k in range(n):
+                    room.A[i, k] = J[i, k]
+        if out:
+            for i in range(m):
+                room.A[i, j] = 0.0
     return found
 
 
@@ -223,8 +244,8 @@ def _fill(
     turn: FloatArray,
     room: Room,
 ) -> None:
-    """U, Vt and D of J, whose left singular vectors and values are known."""
-    (m, n), s, U, Vt, D, far = J.shape, room.s, room.U, room.Vt, room.D, 0.0
+    """U, Vt and D of J, whose left singular vectors U and values are known, and ``U^T J``."""
+    (m, n), s, W, U, Vt, D, far = J.shape, room.s, room.W, room.U, room.Vt, room.D, 0.0
     for i in range(m):
         far += error[i] * error[i]
     far = sqrt(far)
@@ -235,12 +256,9 @@ def _fill(
             forward += turn[i, k] * rate[i] if rate.shape[0] > 0 else 0.0
             total += turn[i, k] * b[i]
             e += turn[i, k] * error[i]
-        available, speed = inf, inf
+        available, speed, inverse = inf, inf, 1.0 / s[k]
         for j in range(n):
-            x = 0.0
-            for i in range(m):
-                x += turn[i, k] * J[i, j]
-            Vt[k, j] = x / s[k]
+            Vt[k, j] = W[k, j] * inverse
             share = abs(Vt[k, j])
             if share > 0.0:
                 available = min(available, joints[SLOWING, j] / share)

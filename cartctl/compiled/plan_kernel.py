@@ -1,4 +1,4 @@
-"""What one task is to the loops: a named tuple of views into the plan's arrays."""
+"""What one task is to the loops: a named tuple of views into a store."""
 
 from __future__ import annotations
 
@@ -7,14 +7,6 @@ from typing import NamedTuple
 from cartctl.checks import FloatArray, IntArray
 
 FRAME, JOINTS = 0, 1  # kinds of tasks
-
-# columns of the table of tasks
-KIND, COUNT, FITTED, WEIGHT, OPEN_POSITION, OPEN_ROTATION, PATH, WAITS, WHOLE = 0, 1, 2, 3, 4, 5, 6, 7, 8
-TASK_WIDTH = 9
-
-# columns of the table of rows
-INDEX, ROW_GAIN, UNIT, TURNING, POINT = 0, 1, 2, 3, 4
-ROW_WIDTH = 5
 
 
 class Task(NamedTuple):

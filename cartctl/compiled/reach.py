@@ -118,6 +118,12 @@ def inverse_kinematics(
 
     Raises UnsupportedJoint for a robot whose joints compiled kinematics cannot express (a floating base, mimicking
     joints), FrameNotFound, TargetError, ShapeError, NonFiniteError, ConfigurationError, ParameterError.
+
+    >>> import cartctl as cc
+    >>> robot = cc.load("panda")
+    >>> answer = cc.inverse_kinematics(robot, robot.state(robot.home).placement(robot.tool))
+    >>> print(answer.success, answer.position_error[0] < 1e-4)
+    [ True] True
     """
     if not isinstance(robot, Robot):
         raise ParameterError(f"robot is a {type(robot).__name__}; expected a Robot from cc.load(...)")

@@ -82,6 +82,11 @@ def cylinder(mass: float, radius: float, length: float, inner_radius: float = 0.
     """Cylinder, hollow with ``inner_radius`` = a > 0, outer radius b, m: ``I = m/12 diag(6 (a^2 + b^2), s, s)``.
 
     ``s = 3 (a^2 + b^2) + length^2``; the first moment is that about the axis.
+
+    >>> import cartctl as cc
+    >>> rod = cc.dynamics.cylinder(2.0, radius=0.1, length=1.0)
+    >>> print(rod.inertia.diagonal().round(6))
+    [0.171667 0.171667 0.01    ]
     """
     mass = checks.number("mass", mass, low=0.0)
     b, h = checks.number("radius", radius, low=0.0), checks.number("length", length, low=0.0)

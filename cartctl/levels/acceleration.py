@@ -62,21 +62,9 @@ class AccelerationLevel(Level):
         self._damps = self.damping is not None and bool(np.any(self.damping))
         self.loads: Loads = Loads(friction, wrenches)
 
-    def check(self, solver: Solver, name: str | None = None) -> None:
-        """Refuse a method that keeps an objective extremal, and damping with one that takes no reference.
-
-        name: of the level that asks, its own if None.
-        """
-        if solver.extends:
-            raise UnsupportedProblem(
-                f"level {(name or self.name)!r} has no rows that keep an objective extremal; use level 'velocity', "
-                "or a solver that spends the objective through u0, such as 'projected-gradient'"
-            )
-        if self._damps and "reference" not in solver.honours:
-            raise UnsupportedProblem(
-                f"solver {solver.name!r} takes no reference for the damping of the null space; use damping=0, or a "
-                "solver that honours one, such as 'sns' or 'projected-gradient'"
-            )
+    def check(self, solver: Solver) -> None:
+        """Refuse a method that keeps an objective extremal, and damping with one that takes no reference."""
+        check_solver(self.name, solver, self._damps)
 
     def problem(
         self,
@@ -148,3 +136,17 @@ def _commanded(task: Task, reference: Reference, J: FloatArray, v: FloatArray) -
     rate = -(J @ v) if reference.rate is None else reference.rate - J @ v
     b = k * (2.0 * rate + k * reference.error)
     return b if reference.acceleration is None else b + reference.acceleration
+
+
+def check_solver(level: str, solver: Solver, damps: bool) -> None:
+    """Refuse what neither this level nor that of torques has; level: the name of the one that asks."""
+    if solver.extends:
+        raise UnsupportedProblem(
+            f"level {level!r} has no rows that keep an objective extremal; use level 'velocity', or a solver "
+            "that spends the objective through u0, such as 'projected-gradient'"
+        )
+    if damps and "reference" not in solver.honours:
+        raise UnsupportedProblem(
+            f"solver {solver.name!r} takes no reference for the damping of the null space; use damping=0, or a "
+            "solver that honours one, such as 'sns' or 'projected-gradient'"
+        )

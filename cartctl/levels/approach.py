@@ -99,7 +99,10 @@ class Approach:
         self._bent: dict[int, FloatArray] = {}  # by task: the motion inwards, when it was last clear
         self._above = Above(ranked=not solver.stacks)
         self._walls = Walls(_NOTHING, _NOTHING, np.zeros((0, 0)), _NOTHING, _NOTHING)
-        self._directions, self._bend, self._hold = directions.compiled, bend.compiled, hold.compiled
+
+    def prepare(self) -> None:
+        """Compile ahead what the first step would otherwise wait for."""
+        _ = directions.compiled, bend.compiled, hold.compiled
 
     @property
     def joints(self) -> FloatArray:
@@ -136,7 +139,7 @@ class Approach:
             pace = self._pace(task, state, found, reference)
             b = b - (1.0 - pace) * reference.rate
             D[FORWARD] *= pace
-        edge = self._hold(b, U, D, self._dt, size, self._scales, out)
+        edge = hold.compiled(b, U, D, self._dt, size, self._scales, out)
         if D.shape[1] and D[BEND, -1] != 0.0:
             self._bend_as_before(task, U[:, -1], Vt[-1], D[:, -1], size, out)
         return Approached(out, edge, pace)
@@ -151,7 +154,7 @@ class Approach:
         rate, error = _NOTHING if reference.rate is None else reference.rate, reference.error
         walls = self._walls if reference.rate is None else self._walls.box()  # before a wall one stops, or slides on
         bounded = walls.lower.shape[0] > 0
-        self._directions(J, b, y, rate, error, self._joints, *walls, self._dt, size, bounded, U, Vt, D)
+        directions.compiled(J, b, y, rate, error, self._joints, *walls, self._dt, size, bounded, U, Vt, D)
         self._curvatures(task, state, U, Vt, D, error)
         return Directions(U, Vt, D, size)
 
@@ -162,7 +165,7 @@ class Approach:
         asked = np.flatnonzero(D[ASKED])
         if asked.shape[0]:
             along = Vt if asked.shape[0] == D.shape[1] else Vt[asked]
-            self._bend(error, U, asked, task.curvatures(state, along), D)
+            bend.compiled(error, U, asked, task.curvatures(state, along), D)
 
     def _drift(self, task: Task, state: State, v: FloatArray) -> FloatArray:
         """``J_dot(v) v`` (m,) of a task at another velocity."""
@@ -199,6 +202,15 @@ class Approach:
     def slowed(self, u: FloatArray) -> FloatArray:
         """What is wanted of the null space, no faster than the tasks leave to it."""
         return self._above.slowed(u)
+
+    def bends(self, tasks: Iterable[Task]) -> list[FloatArray | None]:
+        """How the arm was bent when it was last clear, by task: the motion inwards (nv,), None where it never was."""
+        return [self._bent.get(id(task)) for task in tasks]
+
+    def resume(self, tasks: Iterable[Task], bends: Iterable[FloatArray | None]) -> None:
+        """Go on from what another one's :meth:`bends` said."""
+        pairs = zip(tasks, bends, strict=True)
+        self._bent = {id(task): motion for task, motion in pairs if motion is not None}
 
     def reset(self) -> None:
         """Forget how the arm was bent."""

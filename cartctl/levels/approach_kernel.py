@@ -59,7 +59,7 @@ def directions(
         for j in range(n):
             A[i, j] = J[i, j]
     left, s, right = np.linalg.svd(A, full_matrices=False)
-    if bounded and leave_out(A, left, s, right, b, joints, lower, upper, C, c_lower, c_upper, size):
+    if bounded and leave_out(A, left, s, right, b, joints, lower, upper, C, c_lower, c_upper, size, rate.shape[0] > 0):
         left, s, right = np.linalg.svd(A, full_matrices=False)
     far = 0.0
     for i in range(m):

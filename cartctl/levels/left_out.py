@@ -31,14 +31,20 @@ def leave_out(
     c_lower: FloatArray,
     c_upper: FloatArray,
     size: float,
+    moving: bool,
 ) -> bool:
-    """Change A (m, n); whether anything was left out."""
+    """Change A (m, n); whether anything was left out.
+
+    A joint on its way back, whose bounds do not even let it stop, is left out like one that stands; not while the
+    target moves: there, a motion of the null space would hold the hand back.
+    """
     n = A.shape[1]
     wanted = _wanted(left, s, right, b, size)
     found, out = False, np.zeros(n)
     for j in range(n):
         still = joints[_STILL, j]
-        if (wanted[j] > 0.0 and upper[j] <= still) or (wanted[j] < 0.0 and lower[j] >= -still):
+        beyond = upper[j] if wanted[j] > 0.0 else -lower[j]
+        if wanted[j] != 0.0 and beyond <= still and (beyond >= -still or not moving):
             A[:, j] = 0.0
             out[j] = 1.0
             found = True

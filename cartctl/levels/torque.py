@@ -14,7 +14,7 @@ from cartctl.algebra.svd import scale
 from cartctl.checks import FloatArray, is_finite
 from cartctl.constraints import Box, Constraint, Rows
 from cartctl.dynamics.friction import Friction
-from cartctl.levels.acceleration import AccelerationLevel
+from cartctl.levels.acceleration import AccelerationLevel, check_solver
 from cartctl.levels.acceleration_bounds import AccelerationBounds
 from cartctl.levels.base import UNCONFINED, Command, Confines, Level, Motion, Secondary, require_finite
 from cartctl.levels.bounds import JointBounds
@@ -80,7 +80,7 @@ class TorqueLevel(Level):
 
     def check(self, solver: Solver) -> None:
         """As at the acceleration level; refuses damping with a solver that takes no reference."""
-        AccelerationLevel(self.damping if self._damps and self.damping is not None else 0.0).check(solver, self.name)
+        check_solver(self.name, solver, self._damps and self.damping is not None)
         self._kernel = through_inertia.compiled
 
     def check_robot(self, robot: Robot) -> None:

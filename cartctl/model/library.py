@@ -33,7 +33,12 @@ def find(name: str) -> LibraryEntry:
 
 
 def robots() -> dict[str, str]:
-    """Return the robots known by name, with one line about each."""
+    """Return the robots known by name, with one line about each.
+
+    >>> import cartctl as cc
+    >>> "panda" in cc.robots()
+    True
+    """
     return {name: entry.summary for name, entry in _entries().items()}
 
 

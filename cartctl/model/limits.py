@@ -21,6 +21,11 @@ class Limits:
 
     Positions in rad or m, in the coordinate of the joint (a continuous joint and a moving base have none); velocities,
     accelerations and jerks per s, s^2, s^3; torques in N m or N. Raises ShapeError, NonFiniteError, ParameterError.
+
+    >>> import cartctl as cc
+    >>> slow = cc.load("panda").limits.replace(velocity_lower=-0.5, velocity_upper=0.5)
+    >>> print(slow.velocity_upper)
+    [0.5 0.5 0.5 0.5 0.5 0.5 0.5]
     """
 
     position_lower: FloatArray

@@ -50,6 +50,11 @@ def load(
 
     Raises RobotNotFound, UrdfError, JointNotFound, FrameNotFound, ParameterError, ShapeError, NonFiniteError. Missing
     meshes are one CartctlWarning.
+
+    >>> import cartctl as cc
+    >>> robot = cc.load("panda")
+    >>> robot.nv, robot.tool
+    (7, 'panda_hand_tcp')
     """
     if not isinstance(source, (str, os.PathLike)):
         raise ParameterError(f"source is a {type(source).__name__}; expected a name from cc.robots() or a path")
@@ -212,6 +217,11 @@ def planar(
     """A planar arm with links of the given lengths (m) and masses (kg), in the x-y plane, tip frame ``tool``.
 
     joints, name, limits as in :func:`cartctl.model.planar.planar_urdf`. Raises as that and :func:`load`.
+
+    >>> import cartctl as cc
+    >>> arm = cc.planar([1.0, 0.5])
+    >>> arm.state([0.0, 0.0]).position("tool").round(6)
+    array([1.5, 0. , 0. ])
     """
     text = planar_urdf(lengths, masses, joints=joints, name=name, limits=limits)
     parsed = urdf_file.parse(text, "planar arm", MeshFolders(None, ()))

@@ -30,6 +30,14 @@ class State:
     Arrays handed out are read-only and stay valid for good. time: s, when the robot is there, for what moves by itself
     (the obstacles of a scene). Made by :meth:`cartctl.Robot.state`, which checks q and v; raises FrameNotFound for an
     unknown frame.
+
+    >>> import cartctl as cc
+    >>> state = cc.planar([1.0, 1.0]).state([0.0, 1.5707963267948966], v=[1.0, 0.0])
+    >>> print(state.jacobian("tool")[:2].round(6))
+    [[-1. -1.]
+     [ 1.  0.]]
+    >>> print(state.drift("tool")[:2].round(6))
+    [-1. -1.]
     """
 
     __slots__ = (

@@ -11,8 +11,9 @@ import numpy as np
 
 from cartctl import checks
 from cartctl.checks import FloatArray
-from cartctl.compiled.plan import NAMES, Loop, Outcome, prepared, widths
+from cartctl.compiled.plan import Loop, Outcome, prepared, widths
 from cartctl.compiled.threads import thread_count
+from cartctl.compiled.workspace import NAMES
 from cartctl.errors import CartctlWarning, ParameterError, ShapeError, UnsupportedJoint, UnsupportedProblem
 from cartctl.motion.batch_run import Batch
 from cartctl.motion.controller import Controller

@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 
 from cartctl.checks import FloatArray
-from cartctl.compiled.plan import NAMES, Outcome, widths
+from cartctl.compiled.plan import Outcome, widths
+from cartctl.compiled.workspace import NAMES
 from cartctl.errors import ParameterError
 from cartctl.motion.controller import Controller
 from cartctl.motion.recorder import run_of_states

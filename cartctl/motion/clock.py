@@ -11,7 +11,7 @@ from collections.abc import Sequence
 
 from cartctl.algebra.problem import Equation
 from cartctl.checks import FloatArray
-from cartctl.tasks.base import Reference
+from cartctl.tasks.base import Reference, Task
 
 
 class PathClocks:
@@ -28,6 +28,15 @@ class PathClocks:
         self._shares = [1.0] * len(self._running)
         self._last: float | None = None
 
+    @property
+    def kept(self) -> tuple[list[float], list[float], float | None]:
+        """Delays, shares, and when the last step was: what :meth:`resume` goes on from."""
+        return self._delays, self._shares, self._last
+
+    def resume(self, delays: Sequence[float], shares: Sequence[float], last: float | None) -> None:
+        """Go on from another clock."""
+        self._delays, self._shares, self._last = list(delays), list(shares), last
+
     def times(self, t: float) -> list[float]:
         """The targets' times at time t."""
         if not self._any or self._last is None:
@@ -42,6 +51,7 @@ class PathClocks:
         references: Sequence[Reference],
         equations: Sequence[Equation],
         u: FloatArray,
+        tasks: Sequence[Task],
     ) -> None:
         """Take note of a step made at time t: what was commanded, and what u delivers of it."""
         if not self._any:
@@ -49,8 +59,8 @@ class PathClocks:
         self._delays = [t - own for own in times]
         self._last = t
         self._shares = [
-            r.pace * delivered(e, u) if running else 1.0
-            for r, e, running in zip(references, equations, self._running, strict=False)
+            1.0 if task.rests or not running else r.pace * delivered(e, u)
+            for r, e, task, running in zip(references, equations, tasks, self._running, strict=False)
         ]
 
 

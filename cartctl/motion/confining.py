@@ -83,6 +83,20 @@ class Confining:
         if self._approach is not None:
             self._approach.reset()
 
+    def prepare(self) -> None:
+        """Compile ahead what the first step would otherwise wait for."""
+        if self._approach is not None:
+            self._approach.prepare()
+
+    def bends(self, tasks: Sequence[Task]) -> list[FloatArray | None]:
+        """How the arm was bent before, by task."""
+        return [None] * len(tasks) if self._approach is None else self._approach.bends(tasks)
+
+    def resume(self, tasks: Sequence[Task], bends: Sequence[FloatArray | None]) -> None:
+        """Go on from what another way has come to."""
+        if self._approach is not None:
+            self._approach.resume(tasks, bends)
+
     def compiled(self) -> tuple[FloatArray | None, FloatArray | None]:
         """Limits (11, nv) and the approach's figures of the joints (3, nv), None without; raises UnsupportedProblem."""
         if self._constraints:

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import math
-import warnings
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -13,8 +12,14 @@ from cartctl import checks
 from cartctl.algebra.problem import Problem
 from cartctl.algebra.solution import Solution, Status
 from cartctl.checks import LARGEST, FloatArray, is_moderate
+from cartctl.compiled.fused_step import FusedStep
+from cartctl.compiled.lasting import Memory
 from cartctl.constraints import Constraint
-from cartctl.errors import CartctlWarning, NoTasksError, ParameterError, ProblemError, UnsupportedProblem
+from cartctl.errors import (
+    ParameterError,
+    UnsupportedJoint,
+    UnsupportedProblem,
+)
 from cartctl.levels import Command, Level, Secondary, get_level
 from cartctl.levels.base import Confines
 from cartctl.levels.metrics import as_state_metric
@@ -22,6 +27,7 @@ from cartctl.levels.midway import ROUNDS, Midway
 from cartctl.levels.singularity import Guard
 from cartctl.levels.torque import TorqueLevel
 from cartctl.levels.torque_fused import FusedTorque, fuses
+from cartctl.levels.velocity import VelocityLevel
 from cartctl.levels.yielding import missed
 from cartctl.model.limits import Limits
 from cartctl.model.robot import Robot
@@ -29,10 +35,12 @@ from cartctl.model.state import State
 from cartctl.motion.clock import PathClocks
 from cartctl.motion.confining import Confining
 from cartctl.motion.extremal_start import onto_extremal_set
-from cartctl.motion.fallback import towards_rest
+from cartctl.motion.fallback import slowed, within_reach
+from cartctl.motion.given import checked_objective, checked_switches, checked_tasks, clocked, warn_of_unstable_gains
 from cartctl.motion.limiting import ROBOT_LIMITS, RobotLimits, usable_limits
 from cartctl.objectives.base import Objective
-from cartctl.solvers import Solver, get_solver, solvers_that_honour
+from cartctl.solvers import Solver, get_solver
+from cartctl.solvers.sns import SNS
 from cartctl.tasks.base import Task
 
 
@@ -59,7 +67,16 @@ class Controller:
 
     Raises NoTasksError, ProblemError, TimeStepError, FrameNotFound, JointNotFound, SolverNotFound, LevelNotFound,
     UnsupportedProblem, UnderactuatedRobot, MetricError, ParameterError, NonFiniteError.
+
+    >>> import cartctl as cc
+    >>> robot = cc.load("panda")
+    >>> tip = cc.FrameTask(robot.tool, "position", target=[0.5, 0.2, 0.5])
+    >>> controller = cc.Controller(robot, tip, solver="projected-gradient", objective=cc.JointRange(), limits=None)
+    >>> controller.step(robot.home).velocity.shape
+    (7,)
     """
+
+    _fuses: ClassVar[bool] = True  # whether a step may be taken at one stroke; tests compare it with the general way
 
     def __init__(
         self,
@@ -82,22 +99,27 @@ class Controller:
     ) -> None:
         if not isinstance(robot, Robot):
             raise ParameterError(f"robot is a {type(robot).__name__}; expected a Robot from cc.load(...)")
+        self._given = {
+            "robot": robot, "tasks": tasks, "solver": solver, "level": level, "objective": objective, "metric": metric,
+            "dt": dt, "soft_start": soft_start, "constraints": constraints, "disabled": disabled, "jerk": jerk,
+            "path_clock": path_clock, "approach": approach, "singularity": singularity,
+        }  # fmt: skip
         self.robot = robot
-        self.tasks = _checked_tasks(tasks, robot)
+        self.tasks = checked_tasks(tasks, robot)
         self.solver = get_solver(solver)
         self.level = get_level(level)
         self.level.check(self.solver)
         self.level.check_robot(robot)
-        _checked_switches(path_clock=path_clock, approach=approach)
+        checked_switches(path_clock=path_clock, approach=approach)
         self._limits = usable_limits(limits, robot, self.solver, self.level)
         self._guard = Guard(singularity, self.level, robot, self.tasks)
-        self.objective = self._guard.objective(_checked_objective(objective, self.solver, robot))
+        self.objective = self._guard.objective(checked_objective(objective, self.solver, robot))
         if self.objective is not objective:
-            _checked_objective(self.objective, self.solver, robot, "another singularity policy")
+            checked_objective(self.objective, self.solver, robot, "another singularity policy")
         self.metric = metric
         self._extend = getattr(self.solver, "gain", None) if self.solver.extends else None
         self.dt = checks.duration("dt", dt)
-        _warn_of_unstable_gains(self.tasks, self.dt, self.level.stable_below)
+        warn_of_unstable_gains(self.tasks, self.dt, self.level.stable_below)
         self.soft_start = checks.number("soft_start", soft_start, low=0.0)
         self._metric = as_state_metric(metric, robot.nv, self.level.metrics)
         self._weighing = metric if isinstance(metric, str) else "identity" if metric is None else ""
@@ -105,20 +127,37 @@ class Controller:
         self.solver.prepare()
         self._fused = self._fused_way()
         self._constraints, self._disabled, self._jerk, self._approach = constraints, disabled, jerk, approach
-        clocked = _clocked(path_clock, self.tasks, self.solver.scales or self._guard.waits, self.level)
-        self._clocks = PathClocks(clocked)
-        self._waiting = [task for task, waits in zip(self.tasks, clocked, strict=True) if waits]
+        waiting = clocked(path_clock, self.tasks, self.solver.scales or self._guard.waits, self.level)
+        self._clocks = PathClocks(waiting)
+        self._waiting = [task for task, waits in zip(self.tasks, waiting, strict=True) if waits]
         self._confining = self._confined_by(self._limits)
         self._last: Solution | None = None
-        self.step_times: list[float] = []  # each task's own time at the last step
+        self._step_times: list[float] = []
         self._state = State(robot)
         self._zeros = np.zeros(robot.nv)
         self._zeros.flags.writeable = False
         self._anchors: list[Any] | None = None
         self._started: float | None = None
+        self._stroke = self._at_one_stroke()
+        if self._stroke is None:
+            self._confining.prepare()
+        self._ahead = False  # whether what lasts is with the stroke, and what is here is out of date
+
+    def replace(self, **changes: Any) -> Controller:
+        """A new Controller with some arguments changed, as in ``controller.replace(solver="hqp")``; it starts afresh.
+
+        It works under the limits in force here, unless it is given others. Raises as the constructor does,
+        UnsupportedProblem where a solver honours no limits and ``limits=None`` does not say so.
+        """
+        unknown = [name for name in changes if name not in self._given and name != "limits"]
+        if unknown:
+            known = ", ".join([*self._given, "limits"])
+            raise ParameterError(f"a Controller has no argument {unknown[0]!r}; expected one of {known}")
+        return Controller(**{"limits": self._limits, **self._given, **changes})
 
     def reset(self) -> None:
         """Forget all that lasts from step to step, as before the first one."""
+        self._ahead = False
         self._anchors = None
         self._started = None
         self._last = None
@@ -134,8 +173,12 @@ class Controller:
     @limits.setter
     def limits(self, limits: Limits | None) -> None:
         limits = usable_limits(limits, self.robot, self.solver, self.level)
-        self._confining = self._confined_by(limits)
-        self._limits = limits
+        confining = self._confined_by(limits)
+        self._fall_back()
+        self._confining, self._limits = confining, limits
+        self._stroke = self._at_one_stroke()
+        if self._stroke is None:
+            confining.prepare()
 
     def compiled_limits(self) -> tuple[FloatArray | None, FloatArray | None, list[bool]]:
         """What a compiled loop needs to know of the limits: (11, nv), (3, nv) of the approach, and whose paths wait.
@@ -158,9 +201,46 @@ class Controller:
             return None
         return FusedTorque(self.level, self.solver, self.tasks, self.robot.nv)
 
+    def _at_one_stroke(self) -> FusedStep | None:
+        """The whole step in compiled code, at the velocity level, where there is such a way for everything given."""
+        plain = self.metric is None or (isinstance(self.metric, str) and self.metric == "identity")
+        if not (self._fuses and type(self.level) is VelocityLevel and plain):
+            return None
+        if self.objective is not None or self._guard.policy is not None:
+            return None
+        try:
+            packed, braking, waits = self.compiled_limits()
+            return FusedStep(self.robot, self.tasks, self.solver, packed, braking, waits, self.dt)
+        except (UnsupportedProblem, UnsupportedJoint):
+            return None
+
+    def _hand_over(self, stroke: FusedStep) -> None:
+        """Let that way go on from where the general one has come to."""
+        lasting = (*self._clocks.kept, self._confining.bends(self.tasks))
+        stroke.lasting.resume(Memory(self._anchors, self._started, self._step_times, *lasting))
+        self._ahead = True
+
+    def _fall_back(self) -> None:
+        """Take what lasts back from the stroke."""
+        if not self._ahead or self._stroke is None:
+            return
+        memory = self._stroke.lasting.memory
+        self._ahead = False
+        self._anchors, self._started, self._last = memory.anchors, memory.started, None
+        if memory.anchors is not None:
+            self._step_times = memory.times
+        self._clocks.resume(memory.delays, memory.shares, memory.last)
+        self._confining.resume(self.tasks, memory.bent)
+
+    @property
+    def step_times(self) -> list[float]:
+        """Each task's own time at the last step."""
+        times = self._stroke.lasting.step_times if self._ahead and self._stroke is not None else None
+        return self._step_times if times is None else times
+
     def times(self, t: float) -> list[float]:
         """Each task's own time when everybody else's is t: later by what its path has waited."""
-        return self._clocks.times(t)
+        return self._stroke.lasting.times(t) if self._ahead and self._stroke is not None else self._clocks.times(t)
 
     def start(self, q0: FloatArray) -> FloatArray:
         """Where a rollout from q0 (nq,) begins: q0, or for a solver that keeps an objective extremal, on that set.
@@ -178,6 +258,25 @@ class Controller:
         Raises ShapeError, NonFiniteError, ConfigurationError, TargetError; afterwards the next good step works as if
         nothing had happened. A singularity is a status of ``command.solution``.
         """
+        stroke = self._stroke
+        if stroke is None:
+            return self._stepped(q, v, t)
+        if self.solver is stroke.solver and self.tasks is stroke.tasks and self.objective is None:
+            if not self._ahead:
+                self._hand_over(stroke)
+            command = stroke.step(q, v, t)
+            if command is not None:
+                return command
+        ahead = self._ahead
+        self._fall_back()
+        try:
+            return self._stepped(q, v, t)
+        except BaseException:  # a refused step leaves no trace
+            self._ahead = ahead
+            raise
+
+    def _stepped(self, q: FloatArray, v: FloatArray | None, t: float) -> Command:
+        """The general way: a Problem by the level, answered by the solver."""
         state = self.observe(q, v, t)
         if self.level.loads is not None:
             self.level.loads.time = t
@@ -203,9 +302,9 @@ class Controller:
         solution.guarded = guarded
         self._anchors, self._started = anchors, started  # only now: a refused step leaves no trace
         self._last = solution
-        self.step_times = times
+        self._step_times = times
         if self._waiting:
-            self._clocks.tick(t, times, references, problem.equations, solution.u)
+            self._clocks.tick(t, times, references, problem.equations, solution.u, self.tasks)
         return self.level.command(solution, references, state)
 
     @property
@@ -242,13 +341,13 @@ class Controller:
             p = problem = problem or solution.problem
             bounds = (p.lower, p.upper, blocks)
             p = Problem.trusted(p.equations, p.metric, p.reference, *bounds)
-            solution = self._solve(p, state, solution, midway.state)
+            solution = self._solve(p, state, solution, at=midway.state)
         return solution
 
     def _solve(self, problem: Problem, state: State, start: Solution | None, at: State | None = None) -> Solution:
         """The solver's answer, from an earlier one; where limits exclude each other they yield in their order.
 
-        A task with no feasible scale is slowed towards standing still. at: where M and h are taken from, if not from
+        A task with no feasible scale but 0 is asked for what it can do. at: where M and h are taken from, if not from
         the state.
         """
         solution = self.solver.solve(problem, start)
@@ -260,15 +359,24 @@ class Controller:
                 solution = self.solver.solve(problem)
                 if missed(solution):
                     solution = Solution(problem, best, self.solver.name, status=Status.INFEASIBLE)
+        if self._stands_still(solution) and (reachable := within_reach(problem, self.solver.solve)) is not None:
+            problem, solution = reachable, self.solver.solve(reachable)
         if _skipped(solution) or (self._confining.yields and solution.failed):
             stopping = self._confining.stopping(problem, state, at)
-            again = towards_rest(problem, ~(solution.scales == 1.0), stopping)
+            again = slowed(problem, ~(solution.scales == 1.0), stopping)
             solution = self.solver.solve(again, solution)
             if self._confining.yields and (_skipped(solution) or solution.failed):
                 skipped = np.full(len(again.equations), np.nan)  # what is left is to brake, within all bounds
                 solution = Solution(again, stopping, self.solver.name, status=Status.SKIPPED, scales=skipped)
         solution.recovering, solution.yielded = self._confining.recovering, yielded
         return solution
+
+    def _stands_still(self, solution: Solution) -> bool:
+        """Whether the first task's command is scaled to nothing, and a task has lost rank."""
+        if not (solution.lost_rank and type(self.solver) is SNS and not _skipped(solution)):
+            return False
+        first = solution.problem.equations[0]
+        return first.fit == "scale" and first.drift is None and bool(solution.scales[0] == 0.0)
 
     def _secondary(self, elapsed: float) -> Secondary:
         """The objective, its share rising as 3 x^2 - 2 x^3 over the soft start."""
@@ -299,73 +407,10 @@ class Controller:
     @property
     def anchors(self) -> list[Any]:
         """What each task holds on to since the first step."""
-        return [None] * len(self.tasks) if self._anchors is None else self._anchors
+        anchors = self._stroke.lasting.anchors if self._ahead and self._stroke is not None else self._anchors
+        return [None] * len(self.tasks) if anchors is None else anchors
 
 
 def _skipped(solution: Solution) -> bool:
     """Whether a task has no feasible scale; of few numbers, a loop knows sooner than an array."""
     return any(s != s for s in solution.scales.tolist())
-
-
-def _checked_tasks(tasks: Task | Sequence[Task], robot: Robot) -> tuple[Task, ...]:
-    if isinstance(tasks, Task):
-        tasks = (tasks,)
-    if not isinstance(tasks, Sequence):
-        raise ProblemError(f"tasks is a {type(tasks).__name__}; expected a Task or a sequence of tasks")
-    if not tasks:
-        raise NoTasksError("tasks is empty; expected at least one Task, such as cc.FrameTask(robot.tool)")
-    for k, task in enumerate(tasks):
-        if not isinstance(task, Task):
-            raise ProblemError(f"tasks[{k}] is a {type(task).__name__}; expected a Task")
-        task.check(robot)
-    return tuple(tasks)
-
-
-def _checked_switches(**switches: Any) -> None:
-    for name, value in switches.items():
-        if not (isinstance(value, bool) or (value is None and name == "path_clock")):
-            raise ParameterError(f"{name} is {value!r}; expected True or False")
-
-
-def _clocked(asked: bool | None, tasks: Sequence[Task], slowed: bool, level: Level) -> list[bool]:
-    """Which tasks have a path that waits: by default every one, where commands are slowed and the level can."""
-    if asked and not level.clocked:
-        raise UnsupportedProblem(f"level {level.name!r} has no path clock; use level 'velocity', or path_clock=False")
-    waits = level.clocked and (slowed if asked is None else asked)
-    return [bool(waits) for _ in tasks]
-
-
-def _checked_objective(
-    objective: Objective | None, solver: Solver, robot: Robot, otherwise: str = "objective=None"
-) -> Objective | None:
-    if objective is None:
-        if solver.extends:
-            raise ProblemError(
-                f"solver {solver.name!r} has no objective to keep extremal; give one, as cc.JointRange()"
-            )
-        return None
-    if not isinstance(objective, Objective):
-        raise ParameterError(
-            f"objective is a {type(objective).__name__}; expected an Objective such as cc.JointRange()"
-        )
-    checks.number(f"the gain of {type(objective).__name__}", objective.gain, low=0.0)
-    if "reference" not in solver.honours and not solver.extends:
-        able = ", ".join(repr(s) for s in solvers_that_honour("reference"))
-        raise UnsupportedProblem(
-            f"solver {solver.name!r} has no null-space term for an objective; use {able}, or {otherwise}"
-        )
-    objective.check(robot)
-    return objective
-
-
-def _warn_of_unstable_gains(tasks: Sequence[Task], dt: float, limit: float) -> None:
-    """A sampled error shrinks by (1 - k dt) a step: above k dt = 2 it grows, with two integrators above 1."""
-    for task in tasks:
-        gain = float(np.max(task.gain, initial=0.0))
-        if gain * dt >= limit:
-            warnings.warn(
-                f"task {task.name!r}: gain {gain:g} 1/s times dt {dt:g} s is {gain * dt:.3g}; the loop is unstable "
-                f"from {limit:g} on; use a gain below {0.5 * limit / dt:g}, or a smaller dt",
-                CartctlWarning,
-                stacklevel=3,
-            )

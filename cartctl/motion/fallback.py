@@ -1,17 +1,25 @@
-"""What becomes of a task for which no scale is feasible: it is slowed towards standing still, not towards nothing.
+"""What becomes of a task for which no scale will do: it is not given up, but asked for what it can do.
 
-Where 0 is outside the box (a joint still brakes, or is brought back), a task at s = 0 may be as infeasible as at s = 1.
-With u_b the stopping command clipped into the box, the task is asked for ``A u = A u_b + s (b - d - A u_b)``, which has
-an answer at s = 0; a task below the first, whose s = 0 the ones above may rule out, is asked to stand as best it can.
+**No scale is feasible** where 0 is outside the box (a joint still brakes, or is brought back). With u_b the stopping
+command clipped into the box, the highest task is asked for ``A u = A u_b + s (b - d - A u_b)``, which has an answer at
+s = 0; a task further down, whose s = 0 those above may rule out, is asked to stand as best it can.
+
+**No scale but 0 is** where b has a part that no u can deliver, at an exact singularity: an arm stretched out would
+stand still for ever. The highest task is then asked for the other part, ``A u = s A u_b``, with u_b of least squares.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from cartctl.algebra.problem import Equation, Problem
+from cartctl.algebra.solution import Solution
 from cartctl.checks import FloatArray
 
+_BEYOND = 1e-6  # of a command: a part as large that cannot be obeyed
 
-def towards_rest(problem: Problem, skipped: FloatArray, stopping: FloatArray) -> Problem:
+
+def slowed(problem: Problem, skipped: FloatArray, stopping: FloatArray) -> Problem:
     """The problem with its skipped equations (p,) replaced; stopping: (n,)."""
     stopping = problem.clip(stopping)
     first = True
@@ -26,6 +34,21 @@ def towards_rest(problem: Problem, skipped: FloatArray, stopping: FloatArray) ->
             rest = e.A @ stopping
             equations.append(Equation.trusted(e.A, rest, None, "least_squares", e.weight, e.name, e.size))
         first = False
-    return Problem.trusted(
-        tuple(equations), problem.metric, problem.reference, problem.lower, problem.upper, problem.constraints
-    )
+    return _with(problem, equations)
+
+
+def within_reach(problem: Problem, solve: Callable[[Problem], Solution]) -> Problem | None:
+    """The problem with the part of its first command that can be obeyed; None where that is all of it."""
+    e = problem.equations[0]
+    alone = Equation.trusted(e.A, e.b, None, "least_squares", e.weight, e.name, e.size)
+    along = e.A @ solve(Problem.trusted((alone,), None, None, None, None)).u
+    missed = e.b - along
+    if not float(missed @ missed) > _BEYOND * _BEYOND * float(e.b @ e.b):
+        return None
+    part = Equation.trusted(e.A, along, 0.0 * along, "scale", e.weight, e.name, e.size)
+    return _with(problem, [part, *problem.equations[1:]])
+
+
+def _with(problem: Problem, equations: list[Equation]) -> Problem:
+    p = problem
+    return Problem.trusted(tuple(equations), p.metric, p.reference, p.lower, p.upper, p.constraints)

@@ -19,6 +19,7 @@ from cartctl.motion.controller import Controller
 from cartctl.motion.mover import Driven, Mover
 from cartctl.motion.run import Run, TaskRecord
 from cartctl.motion.surroundings import Surroundings
+from cartctl.tasks import FrameTask
 
 
 class Recorder:
@@ -162,7 +163,15 @@ class _TaskRows:
             singular_values=self.singular[:samples].copy(),
             pose=None if self.value is None else self.value[:samples].copy(),
             target=None if self.target is None else self.target[:samples].copy(),
+            rows=world_rows(task),
         )
+
+
+def world_rows(task: Any) -> list[int] | None:
+    """The rows of a frame's pose in the world's axes that a task moves, None where it moves something else."""
+    if not isinstance(task, FrameTask) or task.expressed_in != "world":
+        return None
+    return list(task.rows)
 
 
 def _meta(controller: Controller, interrupted: bool) -> dict[str, Any]:

@@ -26,7 +26,8 @@ class TaskRecord:
 
     name, kind, frame: what it was. units: one a row, "m", "rad" or "". error: (N+1, m) target minus value. scale: (N,)
     share of the command delivered. singular_values: (N+1, min(m, nv)) of its Jacobian. pose, target: (N+1, 7)
-    x y z qx qy qz qw or (N+1, 3), None where there is nothing to draw.
+    x y z qx qy qz qw or (N+1, 3), None where there is nothing to draw. rows: which rows of the frame's pose in the
+    world's axes it moves, 0-2 linear, 3-5 angular; None where it moves something else.
     """
 
     name: str
@@ -38,6 +39,7 @@ class TaskRecord:
     singular_values: FloatArray
     pose: FloatArray | None
     target: FloatArray | None
+    rows: list[int] | None = None
 
 
 class Run:

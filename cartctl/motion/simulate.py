@@ -53,6 +53,13 @@ def simulate(
     Raises RunInterrupted on Ctrl-C, with every step made so far in ``.run``; TimeStepError for a duration that is not
     positive or takes too many steps; ParameterError, ShapeError, FrameNotFound, UnderactuatedRobot for a plant that
     does not fit, and whatever :meth:`Controller.step` raises.
+
+    >>> import cartctl as cc
+    >>> robot = cc.planar([1.0, 1.0, 1.0])
+    >>> tip = cc.FrameTask("tool", "xy", gain=4.0, target=[1.5, 1.5, 0.0])
+    >>> run = cc.simulate(cc.Controller(robot, tip, solver="dls", limits=None, dt=0.01), duration=3.0)
+    >>> run.metrics().tasks[0].final_m < 1e-4
+    True
     """
     if not isinstance(controller, Controller):
         raise ParameterError(f"controller is a {type(controller).__name__}; expected a cc.Controller")

@@ -38,6 +38,7 @@ def save(run: Run, path: Path) -> Path:
     arrays["status"] = np.array([codes[s] for s in run.status], dtype=np.int8)
     for i, task in enumerate(run.tasks):
         header["tasks"].append({"name": task.name, "kind": task.kind, "frame": task.frame, "units": task.units})
+        header["tasks"][-1]["rows"] = task.rows
         arrays.update({f"task{i}_{n}": getattr(task, n) for n in _TASK_ARRAYS if getattr(task, n) is not None})
     if run.torque is not None:
         arrays["torque"] = run.torque
@@ -86,6 +87,9 @@ def load(path: Path) -> Run:
 
 def _task(i: int, entry: dict[str, Any], arrays: dict[str, Any]) -> TaskRecord:
     values: dict[str, Any] = {n: arrays.get(f"task{i}_{n}") for n in _TASK_ARRAYS}
+    rows = entry.get("rows")
+    if rows is not None and not all(type(row) is int and 0 <= row < 6 for row in rows):
+        raise ValueError("rows of no pose")
     return TaskRecord(**entry, **values)
 
 

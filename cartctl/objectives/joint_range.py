@@ -20,6 +20,12 @@ class JointRange(Objective):
     others contribute nothing. H is at most 1/8 within the limits. gain: k > 0 in ``q_dot_0 = -k grad H``; grad H is
     small, (q - mid) / (n range^2), so that k = 100 means time constants of seconds on an arm. limits: Limits to use
     instead of the robot's own.
+
+    >>> import cartctl as cc
+    >>> robot = cc.load("panda")
+    >>> middle = (robot.limits.position_lower + robot.limits.position_upper) / 2
+    >>> print(cc.JointRange().value(robot.state(middle)), cc.JointRange().gradient(robot.state(middle)).max())
+    0.0 0.0
     """
 
     gain: float = 100.0

@@ -35,6 +35,11 @@ class Circle(PlaneLoop):
             too steep.
 
     Raises PathError unless radius and period are positive, the normal is not zero, x_axis is in the plane.
+
+    >>> import cartctl as cc
+    >>> circle = cc.Circle([1.0, 0.0, 0.0], radius=0.5, period=2.0)
+    >>> print(circle(1.0).position.round(6))
+    [0.5 0.  0. ]
     """
 
     center: ArrayLike | pin.SE3

@@ -38,6 +38,10 @@ class Actor:
         self.placements = _placements(self.run.robot.model, self.run.q[self.shown])
         self.records = [r for r in self.run.tasks if r.pose is not None and r.target is not None]
 
+    def pose_as(self, configurations: Array) -> None:
+        """Show the robot in other configurations (k, nq) than the run's."""
+        self.placements = _placements(self.run.robot.model, configurations)
+
     def seen(self, robot: list[Body]) -> Array:
         """Return points (n, 3) that the robot reaches: some of its vertices at some of the frames."""
         found = [np.zeros((1, 3))]

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from cartctl.files import whole_file
 from cartctl.report.comparison import Comparison
+from cartctl.report.comparison_curves import comparison_panels
 from cartctl.report.document import Words, assemble, breakable
 from cartctl.report.palette import COLORS, color
 
@@ -36,7 +37,7 @@ def comparison_page(comparison: Comparison) -> str:
     traced = "" if count > 1 else "actual path"  # the table shows the colours
     below = _table(comparison, colors)
     words = Words(f"{name}: {what}", breakable(name), what, caption, below, traced)
-    return assemble(runs, words, colors)
+    return assemble(runs, words, colors, comparison_panels(comparison, colors))
 
 
 def _table(comparison: Comparison, colors: list[str]) -> str:

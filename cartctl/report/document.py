@@ -17,9 +17,10 @@ from importlib.resources import files
 from string import Template
 from typing import TYPE_CHECKING
 
+from cartctl.report.curves import Panel, rounded
 from cartctl.report.palette import COLORS
 from cartctl.report.recorder import Recorder
-from cartctl.report.scene import Scene
+from cartctl.report.scene import Scene, Switch
 
 if TYPE_CHECKING:
     from cartctl.motion.run import Run
@@ -40,22 +41,27 @@ class Words:
     traced: str = "actual path"
 
 
-def assemble(runs: Sequence[Run], words: Words, colors: Sequence[str] = COLORS[:1]) -> str:
-    """Return the page that shows ``runs``, the paths and ghosts of each in its colour."""
+def assemble(
+    runs: Sequence[Run], words: Words, colors: Sequence[str] = COLORS[:1], panels: Sequence[Panel] = ()
+) -> str:
+    """Return the page that shows ``runs``, the paths and ghosts of each in its colour, and ``panels`` beside them."""
     recorder = Recorder()
     scene = Scene(runs, recorder.visualizer(), colors)
     scene.draw()
     commands = [base64.b64encode(command).decode("ascii") for command in recorder.commands]
-    data = json.dumps({"aspect": scene.stage.view.aspect, "commands": commands})
-    viewer, player = _viewer("main.min.js"), _own("player.js")
+    data = json.dumps({"aspect": scene.stage.view.aspect, "commands": commands, "panels": rounded(panels)})
+    data = data.replace("<", "\\u003c")  # names from a URDF close no element
+    viewer, player = _viewer("main.min.js"), _own("plots.js") + _own("player.js")
     for script in (data, viewer, player):
-        assert "</script" not in script.lower()  # numbers, base64, and two known files
+        assert "</script" not in script.lower()
+    caption = words.caption + _legend(words.traced if scene.records else None, len(scene.obstacles))
+    header = f'<header id="caption"><h1>{words.heading}</h1><p>{escape(words.subtitle)}</p>{caption}</header>'
     return Template(_own("page.html")).substitute(
         policy=_policy(viewer, player), version=escape(_version()), style=_own("page.css"),
-        title=escape(words.title), heading=words.heading, subtitle=escape(words.subtitle),
-        caption=words.caption + _legend(words.traced if scene.records else None, len(scene.obstacles)),
+        title=escape(words.title), over="" if panels else header, beside=header if panels else "",
+        switches="".join(_switch(switch) for switch in scene.switches),
         below=words.below,
-        kind="several" if len(runs) > 1 else "single",
+        kind="several" if len(runs) > 1 else "single", side="" if panels else "hidden",
         scene=data, viewer=viewer, player=player, licences=escape(_licences()),
     )  # fmt: skip
 
@@ -75,6 +81,13 @@ def _legend(traced: str | None, obstacles: int) -> str:
     if not entries:
         return ""
     return "<ul>" + "".join(f'<li class="{kind}">{escape(text)}</li>' for kind, text in entries) + "</ul>"
+
+
+def _switch(switch: Switch) -> str:
+    """Return a switch with the words that explain it, which are shown while it is on."""
+    box = f'<input type="checkbox" data-paths="{escape(switch.paths)}" autocomplete="off"{" checked" * switch.on}>'
+    label = f'<label>{box}<i style="background:{switch.color}"></i>{escape(switch.label)}</label>'
+    return f"{label}<small>{escape(switch.words)}.</small>" if switch.words else label
 
 
 def _policy(*scripts: str) -> str:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from cartctl.errors import ParameterError
 from cartctl.files import whole_file
 from cartctl.report.document import Words, assemble, breakable
+from cartctl.report.run_curves import run_panels
 
 if TYPE_CHECKING:
     from cartctl.motion.run import Run
@@ -31,7 +32,8 @@ def page(run: Run) -> str:
     if not len(run.time):
         raise ParameterError("the run holds no sample; expected one that was simulated for at least a step")
     what = _subtitle(run)
-    return assemble([run], Words(f"{run.robot.name}: {what}", breakable(run.robot.name), what, _errors(run)))
+    words = Words(f"{run.robot.name}: {what}", breakable(run.robot.name), what, _errors(run))
+    return assemble([run], words, panels=run_panels(run))
 
 
 def _subtitle(run: Run) -> str:

@@ -25,7 +25,7 @@ def plot_comparison(comparison: Comparison) -> Figure:
     It belongs to no window and leaves matplotlib's global state alone.
     """
     looks = _looks(list(comparison.runs))
-    drawn = list(_panels(comparison))
+    drawn = list(over_time(comparison))
     rows = _rows([str(k) for k in range(len(drawn))])
     heights = [2.6] * len(rows) + [0.75 + 0.24 * len(looks)]  # inches
     figure = Figure(figsize=(11.0, sum(heights) + 1.0), layout="constrained")
@@ -40,7 +40,7 @@ def plot_comparison(comparison: Comparison) -> Figure:
 
 
 @dataclass(frozen=True)
-class _Panel:
+class Overlay:
     """One quantity of all runs over time."""
 
     title: str
@@ -81,20 +81,20 @@ def _looks(names: list[str]) -> list[_Look]:
     return [_Look(pen(i, name), float(width)) for i, (name, width) in enumerate(zip(names, widths, strict=True))]
 
 
-def _panels(comparison: Comparison) -> Iterator[_Panel]:
+def over_time(comparison: Comparison) -> Iterator[Overlay]:
     """What is drawn over time, in reading order."""
     records = comparison.first.tasks
     for index, record in enumerate(records):
         for unit, (_, title, shown) in panels.MARKED.items():
             if unit in record.units:
                 whole = f"{title} of {plain(record.name)}" if len(records) > 1 else title
-                yield _Panel(whole, shown, series.error(index, unit), logarithmic=True)
+                yield Overlay(whole, shown, series.error(index, unit), logarithmic=True)
     unit = joint_unit(comparison.first.robot)
     goal = comparison.objective
-    yield _Panel(f"Objective: {objective_name(goal)}", "H(q)", lambda run: series.objective(run, goal))
-    yield _Panel("Smallest singular value", "", series.smallest_singular_value, logarithmic=True)
-    yield _Panel("Norm of the joint rates", f"{unit}/s" if unit else "", series.rate_norm)
-    yield _Panel("Largest joint rate", "fraction of limit", series.fastest, limit=1.0)
+    yield Overlay(f"Objective: {objective_name(goal)}", "H(q)", lambda run: series.objective(run, goal))
+    yield Overlay("Smallest singular value", "", series.smallest_singular_value, logarithmic=True)
+    yield Overlay("Norm of the joint rates", f"{unit}/s" if unit else "", series.rate_norm)
+    yield Overlay("Largest joint rate", "fraction of limit", series.fastest, limit=1.0)
 
 
 def _step_times(axes: Any, comparison: Comparison, looks: list[_Look]) -> None:

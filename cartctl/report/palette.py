@@ -76,14 +76,14 @@ def pens(names: Sequence[str], urgency: Array | None = None) -> list[Pen]:
     return [Pen(plain(name), rank[i]) if i in rank else Pen("", GREY, back=True) for i, name in enumerate(names)]
 
 
-def thinned(time: Array, values: Array) -> tuple[Array, Array]:
-    """Return ``time`` (n,) and ``values`` (n,) with at most ``POINTS`` samples, every peak and trough kept.
+def thinned(time: Array, values: Array, points: int = POINTS) -> tuple[Array, Array]:
+    """Return ``time`` (n,) and ``values`` (n,) with at most ``points`` samples, every peak and trough kept.
 
     Each stretch of samples is replaced by its smallest and its largest, in the order of time.
     """
-    if len(time) <= POINTS:
+    if len(time) <= points:
         return time, values
-    stretch = int(np.ceil(2 * len(time) / POINTS))
+    stretch = int(np.ceil(2 * len(time) / points))
     starts = np.arange(0, len(time), stretch)
     parts = [values[s : s + stretch] for s in starts]
     low = np.array([s + np.argmin(p) for s, p in zip(starts, parts, strict=True)])

@@ -49,6 +49,10 @@ class Timeline:
         if quaternions is not None:
             self._track(visualizer, "quaternion", "quaternion", quaternions.tolist())
 
+    def stretch(self, visualizer: Any, scales: Array) -> None:
+        """Animate an object's size along its own axes, ``scales`` (k, 3)."""
+        self._track(visualizer, "scale", "vector3", scales.tolist())
+
     def grow(self, visualizer: Any, counts: NDArray[Any]) -> None:
         """Animate how many of an object's indices are drawn, ``counts`` (k,): a path that grows."""
         self._track(visualizer["<object>"], "geometry[drawRange].count", "number", counts.tolist())

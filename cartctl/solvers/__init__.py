@@ -55,7 +55,12 @@ def solver_class(name: str) -> type[Solver]:
 
 
 def solvers() -> dict[str, str]:
-    """Every registered name with one line on what it does."""
+    """Every registered name with one line on what it does.
+
+    >>> import cartctl as cc
+    >>> cc.solvers()["dls"]
+    'Damped least squares over all equations stacked.'
+    """
     return {name: (solver_class(name).__doc__ or "").strip().splitlines()[0] for name in _REGISTRY}
 
 
@@ -90,6 +95,11 @@ def solve(problem: Problem, solver: str | Solver | type[Solver] = "pinv", *, sta
     start: an earlier Solution, from which a method that can (``sns``, ``hqp``) reaches the same answer sooner.
 
     Raises SolverNotFound, UnsupportedProblem. Numerical trouble is in ``solution.status``.
+
+    >>> import cartctl as cc
+    >>> solution = cc.solve(cc.Problem([([[2.0, 0.0, 0.0], [0.0, 1.0, 1.0]], [1.0, 2.0])]), "pinv")
+    >>> print(solution.u, solution.status)
+    [0.5 1.  1. ] OPTIMAL
     """
     if not isinstance(problem, Problem):
         raise ParameterError(f"problem is a {type(problem).__name__}; expected a cc.Problem")

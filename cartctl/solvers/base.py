@@ -28,6 +28,7 @@ class Solver(ABC):
     """Answers a Problem with a Solution, or refuses what it cannot honour (UnsupportedProblem)."""
 
     name: ClassVar[str]
+    sources: ClassVar[tuple[str, ...]] = ()  # what ``cc.cite`` prints: keys of references.bib, or BibTeX
     stacks: ClassVar[bool] = False  # whether several equations are solved as one
     extends: ClassVar[bool] = False  # whether the level shall add the rows that keep an objective extremal
     scales: ClassVar[bool] = False  # whether commands are slowed down, so that a path had better wait

@@ -34,6 +34,7 @@ class DLS(EquationSolver):
 
     stacks: ClassVar[bool] = True
     name: ClassVar[str] = "dls"
+    sources: ClassVar[tuple[str, ...]] = ("nakamura1986", "wampler1986")
     honours: ClassVar[frozenset[str]] = frozenset({"reference"})
     damping: float = 1e-2
 

@@ -21,6 +21,7 @@ class DLSManipulability(FilteredSolver):
     """
 
     name: ClassVar[str] = "dls-manipulability"
+    sources: ClassVar[tuple[str, ...]] = ("nakamura1986",)
     damping: float = 0.04
     threshold: float = 0.03
 

@@ -21,6 +21,7 @@ class DLSSigma(FilteredSolver):
     """
 
     name: ClassVar[str] = "dls-sigma"
+    sources: ClassVar[tuple[str, ...]] = ("chiaverini1994",)
     damping: float = 0.04
     threshold: float = 0.04
 

@@ -30,6 +30,7 @@ class ExtendedJacobian(PolicySolver):
 
     stacks: ClassVar[bool] = True
     name: ClassVar[str] = "extended-jacobian"
+    sources: ClassVar[tuple[str, ...]] = ("baillieul1985",)
     extends: ClassVar[bool] = True
     gain: float = 20.0
 

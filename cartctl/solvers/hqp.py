@@ -25,6 +25,7 @@ class HQP(ExactSolver):
     """
 
     name: ClassVar[str] = "hqp"
+    sources: ClassVar[tuple[str, ...]] = ("kanoun2011", "escande2014")
     honours: ClassVar[frozenset[str]] = frozenset({"bounds", "constraints", "reference", "inequalities"})
     scaled: bool = False
 

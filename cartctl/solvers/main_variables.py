@@ -1,8 +1,9 @@
 """Main variables: u = A_r# (b - d)_r with r a largest set of independent rows; the others are dropped.
 
 The elimination of a lecture's "main variables": where the rows of A depend on each other, keep rank(A) of them, chosen
-by QR with pivoting, and take their pseudo-inverse. On a consistent command the dropped rows hold by themselves and the
-answer is the pseudo-inverse's; otherwise they are missed by what the residuals say, while the kept ones are met.
+by QR with pivoting (Businger & Golub 1965), and take their pseudo-inverse. On a consistent command the dropped rows
+hold by themselves and the answer is the pseudo-inverse's; otherwise they are missed by what the residuals say, while
+the kept ones are met.
 """
 
 from __future__ import annotations
@@ -32,6 +33,7 @@ class MainVariables(PolicySolver):
 
     stacks: ClassVar[bool] = True
     name: ClassVar[str] = "main-variables"
+    sources: ClassVar[tuple[str, ...]] = ("businger1965",)
 
     def _impl(self, systems: list[System], problem: Problem, u0: FloatArray | None) -> Answer:
         A, c, ratio = stack(systems, problem.equations)

@@ -21,6 +21,7 @@ class NumericalFilteringSolver(FilteredSolver):
     """
 
     name: ClassVar[str] = "numerical-filtering"
+    sources: ClassVar[tuple[str, ...]] = ("maciejewski1988", "chiaverini1997")
     damping: float = 0.04
     threshold: float = 0.04
     beta: float = 1e-4

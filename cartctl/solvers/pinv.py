@@ -26,6 +26,7 @@ class Pinv(PolicySolver):
 
     stacks: ClassVar[bool] = True
     name: ClassVar[str] = "pinv"
+    sources: ClassVar[tuple[str, ...]] = ("penrose1955", "whitney1969")
 
     def _impl(self, systems: list[System], problem: Problem, u0: FloatArray | None) -> Answer:
         A, c, ratio = stack(systems, problem.equations)

@@ -19,9 +19,15 @@ class ProjectedGradient(FilteredSolver, PolicySolver):
     """Pseudo-inverse plus the reference u0, projected onto the null space of all equations stacked.
 
     policy: what becomes of small singular values in the task's part.
+
+    >>> import cartctl as cc
+    >>> problem = cc.Problem([([[1.0, 1.0]], [2.0])], reference=[1.0, 0.0])
+    >>> print(cc.solve(problem, "projected-gradient").u)
+    [1.5 0.5]
     """
 
     name: ClassVar[str] = "projected-gradient"
+    sources: ClassVar[tuple[str, ...]] = ("liegeois1977",)
 
     def filter(self) -> InversePolicy:
         """The policy as given."""

@@ -4,7 +4,9 @@
 
 rho = (damping ||[w_k^1/2 A_k L^-T]||_F)^2 with W = L L^T: damping is relative to the tasks' own scale, so that neither
 units nor a factor in W changes the answer. The order of the equations means nothing here, only their weights do, and
-no weight makes a priority strict. Nothing is scaled: a task that does not fit is missed by a residual.
+no weight makes a priority strict. Nothing is scaled: a task that does not fit is missed by a residual. Redundancy
+under inequalities as a quadratic programme: Cheng, Chen & Sun 1994; the backends OSQP: Stellato et al. 2020, and DAQP:
+Arnstrom, Bemporad & Axehill 2022.
 """
 
 from __future__ import annotations
@@ -89,6 +91,7 @@ class QP(Solver):
 
     stacks: ClassVar[bool] = True
     name: ClassVar[str] = "qp"
+    sources: ClassVar[tuple[str, ...]] = ("cheng1994", "stellato2020", "arnstrom2022")
     honours: ClassVar[frozenset[str]] = frozenset({"bounds", "constraints", "reference"})
     backend: str = "auto"
     damping: float = 1e-3

@@ -38,6 +38,7 @@ class ReducedGradient(EquationSolver):
 
     stacks: ClassVar[bool] = True
     name: ClassVar[str] = "reduced-gradient"
+    sources: ClassVar[tuple[str, ...]] = ("deluca1991",)
     honours: ClassVar[frozenset[str]] = frozenset({"reference"})
 
     @property

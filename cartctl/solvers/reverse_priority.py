@@ -31,6 +31,7 @@ class ReversePriority(EquationSolver):
     """
 
     name: ClassVar[str] = "reverse-priority"
+    sources: ClassVar[tuple[str, ...]] = ("flacco2014",)
     honours: ClassVar[frozenset[str]] = frozenset({"reference"})
     cutoff: float = 1e-10
 

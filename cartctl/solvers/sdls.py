@@ -21,6 +21,7 @@ class SDLS(FilteredSolver):
     """
 
     name: ClassVar[str] = "sdls"
+    sources: ClassVar[tuple[str, ...]] = ("buss2005",)
     limit: float = 3.141592653589793
 
     def __post_init__(self) -> None:

@@ -28,6 +28,7 @@ class SingularityRobustPriority(PolicySolver):
     """
 
     name: ClassVar[str] = "singularity-robust-priority"
+    sources: ClassVar[tuple[str, ...]] = ("chiaverini1997",)
     honours: ClassVar[frozenset[str]] = frozenset({"reference"})
 
     def _impl(self, systems: list[System], problem: Problem, u0: FloatArray | None) -> Answer:

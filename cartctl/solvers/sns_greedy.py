@@ -39,6 +39,7 @@ class SNSGreedy(Solver):
 
     scales: ClassVar[bool] = True
     name: ClassVar[str] = "sns-greedy"
+    sources: ClassVar[tuple[str, ...]] = ("flacco2012", "flacco2015", "fiore2023")
     honours: ClassVar[frozenset[str]] = frozenset({"bounds", "constraints", "reference"})
     cutoff: float = 1e-10
 

@@ -25,9 +25,15 @@ class TaskPriority(PolicySolver):
     """Strict priorities: each equation is met as well as the null space of those above it allows.
 
     policy: what becomes of small singular values; its cutoffs refer to each task's own matrix.
+
+    >>> import cartctl as cc
+    >>> first, second = ([[1.0, 0.0, 0.0]], [1.0]), ([[1.0, 1.0, 0.0]], [0.0])
+    >>> print(cc.solve(cc.Problem([first, second]), "task-priority").u)
+    [ 1. -1.  0.]
     """
 
     name: ClassVar[str] = "task-priority"
+    sources: ClassVar[tuple[str, ...]] = ("maciejewski1985", "nakamura1987", "siciliano1991")
     honours: ClassVar[frozenset[str]] = frozenset({"reference"})
 
     def _impl(self, systems: list[System], problem: Problem, u0: FloatArray | None) -> Answer:

@@ -1,7 +1,8 @@
 """Task scaling: the largest s in [0, 1] such that u(s) = A#_W (s b - d) + (I - A# A) u0 respects the bounds.
 
-u is affine in s, so every bound and every row of C leaves an interval of s and the answer is in closed form. All
-commands are slowed alike; equations with ``fit="least_squares"`` are not slowed.
+u is affine in s, so every bound and every row of C leaves an interval of s and the answer is in closed form: the hand
+stays on its path and arrives later (Antonelli, Chiaverini & Fusco 2003). All commands are slowed alike; equations with
+``fit="least_squares"`` are not slowed.
 """
 
 from __future__ import annotations
@@ -35,6 +36,7 @@ class TaskScaling(Solver):
     stacks: ClassVar[bool] = True
     scales: ClassVar[bool] = True
     name: ClassVar[str] = "task-scaling"
+    sources: ClassVar[tuple[str, ...]] = ("antonelli2003",)
     honours: ClassVar[frozenset[str]] = frozenset({"bounds", "constraints", "reference"})
     policy: InversePolicy = field(default_factory=Truncated)
 

@@ -1,8 +1,8 @@
 """Jacobian transpose: u = alpha W^-1 A^T (b - d).
 
 A gradient step on 1/2 ||b - d||^2 in joint space: it needs no inverse and is never singular, but delivers only part of
-the command. alpha is fixed, or the steepest-descent step ``||A^T c||^2 / ||A A^T c||^2``, the one that leaves the
-least residual along that direction.
+the command (Wolovich & Elliott 1984). alpha is fixed, or the steepest-descent step ``||A^T c||^2 / ||A A^T c||^2``, the
+one that leaves the least residual along that direction (Buss 2004).
 """
 
 from __future__ import annotations
@@ -32,6 +32,7 @@ class Transpose(EquationSolver):
 
     stacks: ClassVar[bool] = True
     name: ClassVar[str] = "transpose"
+    sources: ClassVar[tuple[str, ...]] = ("wolovich1984", "buss2004")
     alpha: float | Literal["steepest"] = "steepest"
 
     def __post_init__(self) -> None:

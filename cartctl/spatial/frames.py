@@ -89,6 +89,11 @@ def move_twist(T: Any, twist: Any) -> FloatArray:
     """``Ad(T) xi``: a twist (6,), or the columns of a Jacobian (6, n), from frame B to frame A, T the pose of B in A.
 
     With R = I only the origin moves, with p = 0 only the axes turn. Errors as :func:`adjoint`.
+
+    >>> from cartctl import spatial
+    >>> lever = spatial.pose(p=[1.0, 0.0, 0.0])  # a frame 1 m along x, given in mine
+    >>> print(spatial.move_twist(lever, [0, 0, 0, 0, 0, 1.0]))  # its turning about z moves me
+    [ 0. -1.  0.  0.  0.  1.]
     """
     return adjoint(T) @ _six("twist", twist)
 

@@ -19,6 +19,10 @@ def exerting_torques(J: Any, wrench: Any) -> FloatArray:
 
     J: (m, n). At rest, without gravity: add ``state.gravity`` to carry the arm's own weight. Prismatic joints have
     forces. Raises ShapeError, NonFiniteError, ParameterError where the torques overflow.
+
+    >>> from cartctl import statics
+    >>> print(statics.exerting_torques([[0.0, 0.0], [1.0, 0.5]], [3.0, 2.0]))
+    [2. 1.]
     """
     J = checks.matrix("J", J)
     with np.errstate(over="ignore", invalid="ignore"):  # refused below

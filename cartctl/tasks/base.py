@@ -11,6 +11,7 @@ have, :class:`cartctl.FunctionTask` takes it as it is.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from itertools import count
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
@@ -21,6 +22,8 @@ from cartctl.checks import FloatArray
 from cartctl.errors import ShapeError, TargetError
 from cartctl.model.robot import Robot
 from cartctl.model.state import State
+
+_numbers = count(1)
 
 
 class Reference(NamedTuple):
@@ -50,6 +53,16 @@ class Task(ABC):
     """
 
     kind: ClassVar[str]
+    # Numbers, never the same twice, of when an attribute was last set: of this task, and of any. Who has made arrays of
+    # tasks looks at them.
+    changes: int = 0
+    latest: ClassVar[int] = 0
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        object.__setattr__(self, name, value)
+        number = next(_numbers)
+        object.__setattr__(self, "changes", number)
+        Task.latest = number
 
     def __init__(self, *, gain: Any, weight: float, fit: str, name: str) -> None:
         self.gain = checks.amounts("gain", gain, checks.PER_SECOND)
@@ -61,6 +74,11 @@ class Task(ABC):
     def frame(self) -> str | None:
         """The frame that moves, where there is one."""
         return None
+
+    @property
+    def rests(self) -> bool:
+        """Whether the target is known to stand still: then there is no path to wait for the hand."""
+        return False
 
     @property
     def target(self) -> Any:

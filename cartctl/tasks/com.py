@@ -43,6 +43,11 @@ class ComTask(Task):
         """A point (3,), a path, or None."""
         self._point, self._path = point_target(value, label, 3, in_space=True)
 
+    @property
+    def rests(self) -> bool:
+        """Whether it follows no path."""
+        return self._path is None
+
     def units(self, robot: Robot) -> list[str]:
         """M."""
         return ["m"] * len(self.rows)

@@ -27,6 +27,15 @@ class FrameTask(PoseTask):
 
     J and e are in LOCAL_WORLD_ALIGNED axes, linear first, m and rad. Raises ParameterError, TargetError,
     NonFiniteError; FrameNotFound when a controller is made.
+
+    >>> import cartctl as cc
+    >>> robot = cc.planar([1.0, 1.0, 1.0])
+    >>> tip = cc.FrameTask("tool", "xy", gain=5.0, target=[1.5, 1.5, 0.0])
+    >>> command = cc.Controller(robot, tip, solver="pinv", limits=None, dt=0.01).step([0.3, 0.5, 0.7])
+    >>> state = robot.state([0.3, 0.5, 0.7])
+    >>> K_e = 5.0 * ([1.5, 1.5] - state.position("tool")[:2])
+    >>> print((state.jacobian("tool")[:2] @ command.velocity / K_e).round(9))
+    [1. 1.]
     """
 
     kind: ClassVar[str] = "frame"

@@ -49,6 +49,11 @@ class JointTask(Task):
         size = None if self.joints is None else len(self.joints)
         self._point, self._path = point_target(value, label, size)
 
+    @property
+    def rests(self) -> bool:
+        """Whether it follows no path."""
+        return self._path is None
+
     def units(self, robot: Robot) -> list[str]:
         """Rad or m, one a joint."""
         return [_unit(robot, name) for name in self._names(robot)]
@@ -132,6 +137,14 @@ class PostureTask(JointTask):
 
     target: (m,) coordinates or None for home; everything else as in :class:`cartctl.JointTask`. A moving base is left
     out.
+
+    >>> import cartctl as cc
+    >>> robot = cc.planar([1.0, 1.0, 1.0])
+    >>> tasks = [cc.FrameTask("tool", "xy"), cc.PostureTask(gain=2.0)]  # the posture with what the tip leaves free
+    >>> controller = cc.Controller(robot, tasks, solver="task-priority", limits=None, dt=0.01)
+    >>> run = cc.simulate(controller, [0.1, 0.9, 0.4], duration=1.0)
+    >>> run.metrics().tasks[0].max_m < 1e-4
+    True
     """
 
     kind: ClassVar[str] = "posture"

@@ -82,6 +82,11 @@ class PoseTask(Task):
         robot.frame_id(self._frame)
         _ = pose_error.compiled
 
+    @property
+    def rests(self) -> bool:
+        """Whether it follows no path."""
+        return self._path is None
+
     def units(self, robot: Robot) -> list[str]:
         """M for linear rows, rad for angular ones."""
         return ["m" if r < 3 else "rad" for r in self.rows]
@@ -102,6 +107,10 @@ class PoseTask(Task):
         """The pose at the first step."""
         p, R = self.pose(state)
         return Anchor(np.array(p), np.array(R))
+
+    def holding(self, position: FloatArray, rotation: FloatArray) -> Anchor:
+        """What :meth:`anchor` says of a pose."""
+        return Anchor(position, rotation)
 
     @property
     def path(self) -> Callable[[float], Any] | None:

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from cartctl.algebra.svd import singular_values
-from cartctl.motion.recorder import cycles_of, provenance
+from cartctl.motion.recorder import cycles_of, provenance, world_rows
 from cartctl.motion.run import Run, TaskRecord
 from cartctl.tasks.base import Task
 from cartctl.wholepath.report import PlanReport
@@ -68,6 +68,7 @@ def _record(trace: Trace, task: Task, anchor: Any) -> TaskRecord:
         singular_values=np.array(spreads),
         pose=np.array(values) if values else None,
         target=np.array(targets) if targets else None,
+        rows=world_rows(task),
     )
 
 

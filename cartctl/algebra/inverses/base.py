@@ -27,6 +27,7 @@ class InversePolicy(ABC):
 
     damps: ClassVar[bool] = True
     linear: ClassVar[bool] = True
+    sources: ClassVar[tuple[str, ...]] = ()  # what ``cc.cite`` prints: keys of its file, or BibTeX
 
     def prepare(self) -> None:
         """Compile what the first solve would otherwise wait for; nothing, unless a policy has a kernel."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -21,6 +22,7 @@ class NumericalFiltering(InversePolicy):
     singular values.
     """
 
+    sources: ClassVar[tuple[str, ...]] = ("maciejewski1988", "chiaverini1997")
     damping: float = 0.04
     threshold: float = 0.04
     beta: float = 1e-4

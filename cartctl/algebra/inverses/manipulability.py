@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import ClassVar
 
 from cartctl import checks
 from cartctl.algebra.inverses.base import NOISE, InversePolicy, damped_factors
@@ -19,6 +20,7 @@ class ManipulabilityDamped(InversePolicy):
     w = sqrt(det(A A^T)), which depend on the number of rows.
     """
 
+    sources: ClassVar[tuple[str, ...]] = ("nakamura1986",)
     damping: float = 0.04
     threshold: float = 0.03
 

@@ -27,6 +27,7 @@ class SelectivelyDamped(InversePolicy):
     has a metric W = L L^T, of L^T u.
     """
 
+    sources: ClassVar[tuple[str, ...]] = ("buss2005",)
     linear: ClassVar[bool] = False
     limit: float = np.pi
 

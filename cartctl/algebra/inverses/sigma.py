@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -19,6 +20,7 @@ class SigmaDamped(InversePolicy):
     damping: lambda_max > 0; threshold: eps > 0; both in the units of the singular values.
     """
 
+    sources: ClassVar[tuple[str, ...]] = ("chiaverini1994",)
     damping: float = 0.04
     threshold: float = 0.04
 

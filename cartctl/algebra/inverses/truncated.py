@@ -17,8 +17,14 @@ class Truncated(InversePolicy):
     """``phi = 1/sigma`` where sigma > cutoff * scale, else 0 (Penrose 1955).
 
     cutoff: relative to the Frobenius norm of the task's own matrix, in [1e-13, 1).
+
+    >>> import cartctl as cc
+    >>> nearly_singular = cc.Problem([([[1.0, 0.0], [0.0, 1e-12]], [1.0, 1.0])])
+    >>> print(cc.solve(nearly_singular, cc.Pinv(cc.Truncated(1e-10))).u)
+    [1. 0.]
     """
 
+    sources: ClassVar[tuple[str, ...]] = ("penrose1955",)
     damps: ClassVar[bool] = False
     cutoff: float = 1e-10
 

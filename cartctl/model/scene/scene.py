@@ -31,6 +31,13 @@ class Scene:
     afterwards counts from the next step on.
 
     Raises ParameterError, ShapeError, NonFiniteError, TargetError; FrameNotFound where it meets a robot.
+
+    >>> import cartctl as cc
+    >>> scene = cc.Scene().sphere("ball", 0.1, at=[0.5, 0.0, 0.4]).box("table", [1.0, 1.0, 0.05], at=[0.5, 0.0, 0.1])
+    >>> robot = cc.load("panda")
+    >>> avoid = cc.Avoid(scene, margin=0.01)
+    >>> avoid.closest(robot.state(robot.home)).distance > 0.0
+    True
     """
 
     def __init__(self) -> None:

@@ -1,4 +1,3 @@
-"use strict";
 (() => {
   const el = (id) => document.getElementById(id);
   const trouble = (text) => { el("trouble").textContent = text; el("trouble").hidden = false; };
@@ -34,13 +33,29 @@
     viewer.camera.zoom = Math.min(1, view.clientWidth / view.clientHeight / scene.aspect);
     viewer.set_3d_pane_size();
   };
-  addEventListener("resize", fit);
+  new ResizeObserver(fit).observe(view);
   fit();
 
+  // What can be shown or hidden beside the robot.
+  for (const box of document.querySelectorAll("[data-paths]")) {
+    const apply = () => {
+      for (const path of box.dataset.paths.split(" ")) {
+        viewer.set_property(["meshcat", ...path.split("/")], "visible", box.checked);
+      }
+      viewer.set_dirty();
+    };
+    box.addEventListener("change", apply);
+    apply();
+  }
+
   // One switch a run, and one for all.
+  let plots = null;
   const switches = [...document.querySelectorAll("[data-run]")], all = el("all");
   const toggle = () => {
-    for (const box of switches) viewer.set_property(["meshcat", "run" + box.dataset.run], "visible", box.checked);
+    for (const box of switches) {
+      viewer.set_property(["meshcat", "run" + box.dataset.run], "visible", box.checked);
+      if (plots) plots.toggle(Number(box.dataset.run), box.checked);
+    }
     const on = switches.filter((box) => box.checked).length;
     if (all) {
       all.checked = on > 0;
@@ -63,6 +78,7 @@
   el("player").hidden = false;
 
   const show = (time) => {
+    if (plots) plots.show(time);
     clock.textContent = time.toFixed(2) + " / " + duration.toFixed(2) + " s";
   };
   const setPlaying = (playing) => {
@@ -83,6 +99,9 @@
     }
     requestAnimationFrame(follow);
   };
+
+  const panels = scene.panels;
+  if (panels.length) plots = makePlots(el("plots"), panels, duration, (time) => seek(Math.min(Math.max(time, 0), duration)));
 
   button.addEventListener("click", () => setPlaying(!animator.playing));
   slider.addEventListener("input", () => seek(slider.valueAsNumber));

@@ -32,6 +32,7 @@ from cartctl.solvers.exact.working_set import (
 )
 
 _HUGE, _TINY = 1e120, 1e-120  # entries beyond these are left to the caller to scale
+_UNEVEN = 1e-3  # of the largest row: one as small is hidden
 _COARSE = 1e-2  # of the size that commands alone suggest for u: what round-off in them is relative to
 
 
@@ -78,7 +79,7 @@ def by_priority(
             scales[k] = 1.0
     if not done:
         flags = by_levels(w, q, e, levels, members, start, u, scales, proofs, most)
-    if w.K[NEARLY, 0] > 0:
+    if w.K[NEARLY, 0] > 0 or _uneven(e, q, levels):
         flags |= DOUBT
     active[0] = 0
     for j in range(w.K[NUM, 0]):
@@ -98,6 +99,24 @@ def by_priority(
         for i in range(out_proofs.shape[1]):
             out_proofs[k, i] = proofs[k, i]
     return flags
+
+
+@part
+def _uneven(e: Equations, q: Inequalities, levels: Levels) -> bool:
+    """Whether rows of one level that is fitted differ so much in size that round-off in one hides another."""
+    n = q.B.shape[1] - q.C.shape[0]
+    for k in range(levels.sizes.shape[0]):
+        least, most = math.inf, 0.0
+        if levels.fits[k] == SCALED:
+            continue
+        for i in range(levels.begin[k], levels.begin[k] + levels.sizes[k]):
+            norm = q.norm[n + i] if levels.fits[k] == INTERVAL else e.norm[i]
+            most = max(most, norm)
+            if norm > 0.0:
+                least = min(least, norm)
+        if least < _UNEVEN * most:
+            return True
+    return False
 
 
 @part
