@@ -92,6 +92,8 @@ def test_torques_of_ones_own_hold_a_pendulum():
     assert np.abs(motion.v[-1]).max() < 1e-3 and motion.torque.shape == (5000, 1)
     with pytest.raises(ShapeError, match="torque at t = 0 s"):
         cc.free_motion(robot, torque=lambda t, q, v: np.zeros(2))
+    with pytest.raises(ParameterError, match=r"torque\[0\] is 1e\+300"):
+        cc.free_motion(cc.load("planar2R"), torque=[1e300, 0.0])
     with pytest.raises(NonFiniteError, match="ran away"):
         cc.free_motion(robot, torque=[1e9], duration=1.0)
     with pytest.raises(UnderactuatedRobot):
@@ -213,6 +215,15 @@ def test_friction_and_masses_that_the_model_lacks():
     other, _ = settled(robot, cc.Plant(robot.carrying(cc.Payload(0.3))))
     same, _ = settled(robot, cc.Plant(payload=cc.Payload(0.3)))
     np.testing.assert_array_equal(other.q, same.q)
+
+
+def test_a_factor_on_the_masses_is_not_one_on_the_payload():
+    robot, load = panda(), cc.Payload(2.0, com=[0.1, 0.0, 0.05], inertia=0.01 * np.eye(3))
+    real = cc.Plant(masses=1.5, payload=load).body(robot).robot
+    bare, held = robot.state(robot.home), robot.carrying(load).state(robot.home)
+    for name in ("mass_matrix", "gravity"):
+        a, b = getattr(bare, name), getattr(held, name)
+        np.testing.assert_allclose(getattr(real.state(robot.home), name), 1.5 * a + (b - a), atol=1e-12)
 
 
 def test_noise_is_of_its_size_and_comes_again():

@@ -124,7 +124,14 @@ def test_misuse_is_named():
         (lambda: dyn.Body(1.0, [1.0, 2.0]), ShapeError, "inertia"),
         (lambda: dyn.Body(1.0, [1.0, 1.0, 2.1]), ParameterError, "principal moments 1, 1, 2.1"),
         (lambda: dyn.Body(1.0, [[1, 0.1, 0], [0, 1, 0], [0, 0, 1]]), ParameterError, "transpose"),
-        (lambda: dyn.rod(1.0, 1.0).moved(rotation=2 * np.eye(3)), ParameterError, "rotation"),
+        (lambda: dyn.rod(1.0, 1.0).moved(rotation=2 * np.eye(3)), ParameterError, "rotation misses R R.T = I by 3"),
+        (lambda: dyn.rod(1.0, 1.0).moved(rotation=-np.eye(3)), ParameterError, "its determinant is -1"),
+        (lambda: dyn.box("2", (1, 1, 1)), ParameterError, "mass is '2'"),
+        (lambda: dyn.cylinder(None, 1.0, 1.0), ParameterError, "mass is None"),
+        (lambda: dyn.sphere("1", 1.0), ParameterError, "mass is '1'"),
+        (lambda: dyn.cone([1.0], 1.0, 1.0), ParameterError, "mass is"),
+        (lambda: dyn.ellipsoid("1", (1, 1, 1)), ParameterError, "mass is '1'"),
+        (lambda: dyn.rod(1.0, 1.0) + 3, TypeError, "Body"),
     ):
         with pytest.raises(error, match=text):
             bad()

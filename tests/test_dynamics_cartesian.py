@@ -100,6 +100,8 @@ def test_misuse_is_named():
         (lambda: cc.dynamics.cartesian_inertia(np.eye(2), np.eye(3)), ShapeError),
         (lambda: cc.dynamics.cartesian_inertia(np.eye(2), np.eye(2), cutoff=-1.0), ParameterError),
         (lambda: cc.dynamics.cartesian_inertia(np.eye(2), np.eye(2)).along([0.0, 0.0]), ParameterError),
+        (lambda: cc.dynamics.cartesian_inertia(1e-200 * np.eye(2), np.eye(2)), ParameterError),
+        (lambda: cc.dynamics.cartesian_inertia(1e200 * np.eye(2), np.eye(2)), ParameterError),
     ):
         with pytest.raises(error, match="M|cutoff|direction"):
             bad()

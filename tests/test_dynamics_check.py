@@ -138,7 +138,11 @@ def test_misuse_is_named():
         (lambda: check(planar_2r, 2, coordinates="polar"), ParameterError, "coordinates"),
         (lambda: check(planar_2r, 2, lower=[4, 4]), ParameterError, "lower"),
         (lambda: check(planar_2r, 2, samples=0), ParameterError, "samples"),
+        (lambda: check(planar_2r, 2, seed=-1), ParameterError, "seed is -1"),
+        (lambda: check(planar_2r, 2, seed="a"), ParameterError, "seed is 'a'"),
+        (lambda: check(np.eye(2), 3), ParameterError, "n is 3, but M has shape (2, 2)"),
     ):
         with pytest.raises(error) as caught:
             bad()
         assert text in str(caught.value)
+    assert check(planar_2r, np.int64(2), samples=np.int64(20))  # a whole number is one, numpy's too

@@ -83,8 +83,9 @@ def test_a_prismatic_link_behind_a_revolute_joint_turns_and_that_counts():
 def test_euler_lagrange_is_newton_euler(seed):
     """Random tables of R and P joints: the equations, derived in symbols, give rnea's torques at random states."""
     arm = random_arm(seed, 1 + seed % 3, angles=(0.0, math.pi / 2, -math.pi / 2))
-    equations, robot = dyn.euler_lagrange(arm).numeric(), cc.Robot(pinocchio_model(arm))
-    rng = np.random.default_rng(seed)
+    symbols, robot = dyn.euler_lagrange(arm), cc.Robot(pinocchio_model(arm))
+    equations, rng = symbols.numeric(), np.random.default_rng(seed)
+    printed = sympy.lambdify([list(symbols.q), list(symbols.dq)], [symbols.M, symbols.c, symbols.g, symbols.S])
     for _ in range(5):
         q, v, a = rng.normal(size=(3, arm.n))
         state, data = robot.state(q, v), robot.model.createData()
@@ -95,17 +96,20 @@ def test_euler_lagrange_is_newton_euler(seed):
         np.testing.assert_allclose(equations.c(q, v), dyn.velocity_torques(state), atol=1e-12 * size)
         np.testing.assert_allclose(equations.g(q), state.gravity, atol=1e-12 * size)
         np.testing.assert_allclose(equations.S(q, v), dyn.coriolis(state), atol=1e-12 * size)
+        own = equations.M(q), equations.c(q, v), equations.g(q), equations.S(q, v)
+        for shown, numbers in zip(printed(q, v), own, strict=True):  # what is printed is what is computed
+            np.testing.assert_allclose(np.reshape(shown, numbers.shape), numbers, atol=1e-12 * size)
         energy = dyn.energy(state)
         assert equations.T(q, v) == pytest.approx(energy.kinetic, rel=1e-11)
         assert equations.U(q) == pytest.approx(energy.potential, rel=1e-11, abs=1e-11 * size)
 
 
-@pytest.mark.parametrize("seed", [100, 101])
-def test_any_twist_angle(seed):
+@pytest.mark.parametrize(("seed", "n"), [(100, 2), (101, 2), (102, 3)])
+def test_any_twist_angle(seed, n):
     """Angles that are no right ones stay exact, as cosines and sines of themselves."""
-    arm = random_arm(seed, 2, angles=(None,))
+    arm = random_arm(seed, n, angles=(None,))
     equations, robot = dyn.euler_lagrange(arm).numeric(), cc.Robot(pinocchio_model(arm))
-    q, v, a = np.random.default_rng(seed).normal(size=(3, 2))
+    q, v, a = np.random.default_rng(seed).normal(size=(3, n))
     expected = pin.rnea(robot.model, robot.model.createData(), q, v, a)
     np.testing.assert_allclose(equations.torque(q, v, a), expected, atol=1e-12 * np.abs(expected).max())
 
@@ -170,6 +174,14 @@ def test_misuse_is_named():
         (lambda: dyn.euler_lagrange(arm).numeric(l=1.0), ParameterError, "m has no value"),
         (lambda: dyn.euler_lagrange(arm).numeric(l=1.0, m=1.0, k=2.0), ParameterError, "there is no k"),
         (lambda: dyn.from_inertia_matrix([["a", "b"]]), ShapeError, "square"),
+        (lambda: dyn.from_inertia_matrix([["a + q3", 0], [0, "b"]]), ParameterError, "'q3' stands in M or U"),
+        (lambda: dyn.from_inertia_matrix([["a", 0], [0, "b*dq1"]]), ParameterError, "'dq1' stands in M or U"),
+        (lambda: dyn.from_inertia_matrix([["a"]], U="cos(q2)"), ParameterError, "coordinates q1 to q1"),
+        (lambda: dyn.DHArm(None), ShapeError, "links is None"),
+        (lambda: dyn.euler_lagrange("arm"), ParameterError, "arm is a str"),
+        (lambda: dyn.moving_frames(3, [0.0], [0.0]), ParameterError, "arm is a int"),
+        (lambda: dyn.euler_lagrange(arm).numeric(l=1.0, m=1.0).M([1e300]), ParameterError, r"q\[0\] is 1e\+300"),
+        (lambda: dyn.euler_lagrange(arm).numeric(l=1.0, m=1.0).c([0.0], [1e200]), ParameterError, r"dq\[0\]"),
         (lambda: dyn.from_inertia_matrix([["a", "b"], ["c", "d"]]), ParameterError, "symmetric"),
     ):
         with pytest.raises(error, match=text):

@@ -99,6 +99,8 @@ def test_misuse_is_named():
         (lambda: scale([[1.0]], [[1.0]], [1.0, 1.0]), ShapeError, "upper"),
         (lambda: scale([[1.0]], [[1.0]], [1.0], [2.0]), ParameterError, r"lower\[0\] is 2"),
         (lambda: scale([[1.0]], [[1.0]], [1.0], at_least=-1), ParameterError, "at_least"),
+        (lambda: scale([[1e308]], [[-1e308]], [1.0]), ParameterError, "beyond the largest number"),
+        (lambda: cc.dynamics.motion_torques("panda", [[0.0]], [[0.0]], [[0.0]]), ParameterError, "robot is a str"),
     ):
         with pytest.raises(error, match=text):
             bad()

@@ -172,6 +172,12 @@ def test_misuse_is_named():
         cc.dynamics.coriolis(state, "skew")
     with pytest.raises(ShapeError, match="torque"):
         cc.dynamics.energy_rate(state, [1.0])
+    terms = ("christoffel", "coriolis", "mass_matrix_derivatives", "mass_matrix_rate", "velocity_torques")
+    for name in (*terms, "energy", "gravity_torques"):
+        with pytest.raises(ParameterError, match=r"state is a Robot; expected a State, such as robot.state"):
+            getattr(cc.dynamics, name)(state.robot)
+    with pytest.raises(ParameterError, match="state is a Robot"):
+        cc.dynamics.energy_rate(state.robot, [1.0])
     with pytest.raises(NonFiniteError, match="gravity"):
         cc.dynamics.energy(state, gravity=[0.0, np.nan, 0.0])
 

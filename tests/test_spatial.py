@@ -342,11 +342,31 @@ NAN = float("nan")
         lambda: spatial.euler_angles("XYZ", np.full((3, 3), NAN)),
         lambda: spatial.log3(np.eye(2)),
         lambda: spatial.log3(np.full((3, 3), NAN)),
+        lambda: spatial.euler_angles("XYZ", 2.0 * np.eye(3)),
+        lambda: spatial.euler_angles("XYZ", [[1.0, 0.5, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]),
+        lambda: spatial.skew([1.0, 2.0]),
+        lambda: spatial.skew([NAN, 0.0, 0.0]),
+        lambda: spatial.cross([1.0, 2.0, 3.0], [0.0, NAN, 0.0]),
+        lambda: spatial.cross([1e200, 1e200, 0.0], [1e200, 1e200, 0.0]),
+        lambda: spatial.rotation_about([0.0, 0.0, 1.0], NAN),
+        lambda: spatial.rotation_about([0.0, 0.0, 2.0], 1.0),
+        lambda: spatial.velocity_conversion(np.eye(3), [NAN, 0.0, 0.0]),
+        lambda: spatial.velocity_conversion(np.diag([1.0, 2.0, 1.0]), np.zeros(3)),
+        lambda: spatial.move_wrench(spatial.pose(p=[1e200, 0.0, 1e200]), np.full(6, 1e200)),
+        lambda: spatial.move_wrench(np.eye(4), np.full(6, 1e200)),
+        lambda: spatial.move_twist(spatial.pose(p=[1.0, 2.0, 3.0]), np.full((6, 2), 1e200)),
     ],
-    ids=["rates of two", "rates of NaN", "angles of 2 x 2", "angles of NaN", "log of 2 x 2", "log of NaN"],
 )
 def test_bad_arrays_are_refused(call):
     """No NaN comes out, no memory beyond the array is read."""
     with pytest.raises(CartctlError) as caught:
         call()
     assert "\n" not in str(caught.value)
+
+
+def test_lists_are_vectors_too():
+    np.testing.assert_array_equal(spatial.cross([1, 0, 0], [0, 1, 0]), [0, 0, 1])
+    np.testing.assert_array_equal(spatial.skew([1, 2, 3]) @ [4, 5, 6], np.cross([1, 2, 3], [4, 5, 6]))
+    np.testing.assert_allclose(spatial.rotation_about([0, 0, 1], 0.5), spatial.exp3([0, 0, 0.5]), atol=tol.ROTATION)
+    V = spatial.velocity_conversion(np.eye(3).tolist(), [1, 0, 0])
+    np.testing.assert_array_equal(V @ [0, 0, 0, 0, 0, 1], [0, 1, 0, 0, 0, 1])

@@ -352,6 +352,12 @@ def test_point_contacts_leave_a_twist_about_their_line():
     [
         (lambda: statics.exerting_torques(np.eye(2), np.zeros(3)), ShapeError, "wrench has shape (3,)"),
         (lambda: statics.holding_torques(np.zeros(3), np.zeros(3)), ShapeError, "J has shape (3,)"),
+        (
+            lambda: statics.exerting_torques(1e200 * np.eye(2), [1e200, 1.0]),
+            ParameterError,
+            "beyond the largest number",
+        ),
+        (lambda: statics.balanced_wrench(1e-300 * np.eye(2), [1e300, 1.0]), ParameterError, "beyond the largest"),
         (lambda: statics.balanced_wrench(np.eye(2), [np.nan, 0.0]), NonFiniteError, "torque[0] is nan"),
         (lambda: statics.balanced_wrench(np.eye(2), np.zeros(2), metric=[1.0, -1.0]), MetricError, "metric[1]"),
         (lambda: statics.balanced_wrench(np.eye(2), np.zeros(2), tolerance=-1.0), ParameterError, "tolerance is -1"),

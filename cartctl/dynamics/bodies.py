@@ -53,13 +53,18 @@ class Body:
         p = checks.vector("translation", translation, 3)
         R = np.eye(3) if rotation is None else checks.matrix("rotation", rotation, 3, 3)
         error = float(np.abs(R @ R.T - np.eye(3)).max())
-        if error > _ORTHOGONAL or np.linalg.det(R) < 0.0:
-            raise ParameterError(f"rotation misses R R^T = I, det R = 1 by {error:.3g}; expected a rotation matrix")
+        determinant = float(np.linalg.det(R))
+        if error > _ORTHOGONAL or determinant < 0.0:
+            raise ParameterError(
+                f"rotation misses R R^T = I by {error:.3g}, its determinant is {determinant:.3g}; expected a rotation"
+            )
         turned = R @ self.inertia @ R.T
         return Body(self.mass, 0.5 * (turned + turned.T), R @ self.com + p)
 
     def __add__(self, other: Body) -> Body:
         """Both as one rigid body."""
+        if not isinstance(other, Body):
+            return NotImplemented
         mass = self.mass + other.mass
         # two massless bodies have their centre of mass anywhere
         com = (self.mass * self.com + other.mass * other.com) / mass if mass > 0.0 else self.com
@@ -68,6 +73,7 @@ class Body:
 
 def box(mass: float, size: Any) -> Body:
     """Parallelepiped of sides ``size`` = (x, y, z), m: ``I = m/12 diag(y^2 + z^2, x^2 + z^2, x^2 + y^2)``."""
+    mass = checks.number("mass", mass, low=0.0)
     x, y, z = _positive("size", size, 3) ** 2
     return Body(mass, mass / 12.0 * np.array([y + z, x + z, x + y]))
 
@@ -82,6 +88,7 @@ def cylinder(mass: float, radius: float, length: float, inner_radius: float = 0.
     >>> print(rod.inertia.diagonal().round(6))
     [0.171667 0.171667 0.01    ]
     """
+    mass = checks.number("mass", mass, low=0.0)
     b, h = checks.number("radius", radius, low=0.0), checks.number("length", length, low=0.0)
     a = checks.number("inner_radius", inner_radius, low=0.0, high=b)
     across = mass / 12.0 * (3.0 * (a * a + b * b) + h * h)
@@ -100,6 +107,7 @@ def disk(mass: float, radius: float, axis: str = "z") -> Body:
 
 def sphere(mass: float, radius: float, inner_radius: float = 0.0) -> Body:
     """Ball of radius b, hollow with ``inner_radius`` = a: ``2/5 m (b^5 - a^5)/(b^3 - a^3)``; a = b is a shell."""
+    mass = checks.number("mass", mass, low=0.0)
     b = checks.number("radius", radius, low=0.0, strict=True)
     a = checks.number("inner_radius", inner_radius, low=0.0, high=b)
     # both differences divided by b - a, so that a thin shell keeps its digits
@@ -110,6 +118,7 @@ def sphere(mass: float, radius: float, inner_radius: float = 0.0) -> Body:
 
 def ellipsoid(mass: float, semi_axes: Any) -> Body:
     """Solid ellipsoid of ``semi_axes`` = (a, b, c), m: ``I = m/5 diag(b^2 + c^2, a^2 + c^2, a^2 + b^2)``."""
+    mass = checks.number("mass", mass, low=0.0)
     a, b, c = _positive("semi_axes", semi_axes, 3) ** 2
     return Body(mass, mass / 5.0 * np.array([b + c, a + c, a + b]))
 
@@ -119,6 +128,7 @@ def cone(mass: float, radius: float, height: float, axis: str = "z") -> Body:
 
     ``3/10 m r^2`` about the axis, ``3/20 m (r^2 + h^2/4)`` across; ``.moved((0, 0, height / 4))`` puts the base at 0.
     """
+    mass = checks.number("mass", mass, low=0.0)
     r, h = checks.number("radius", radius, low=0.0), checks.number("height", height, low=0.0)
     return Body(mass, _about_axis(0.3 * mass * r * r, 0.15 * mass * (r * r + 0.25 * h * h), axis))
 

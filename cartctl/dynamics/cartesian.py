@@ -16,6 +16,8 @@ from cartctl.algebra.svd import ROUND_OFF, numerical_rank, scale, svd
 from cartctl.checks import FloatArray
 from cartctl.errors import ParameterError
 
+_SMALL = 1e-150  # of singular values, whose squares and their inverses are numbers still
+
 
 @dataclass(frozen=True, eq=False)
 class CartesianInertia:
@@ -67,7 +69,8 @@ def cartesian_inertia(J: Any, M: Any, cutoff: float | None = None) -> CartesianI
     norm of ``J L^-T``, count as lost (immovable); by default round-off. Just above it, Lambda is finite and huge: give
     a cutoff such as 1e-2 before turning accelerations into forces with it.
 
-    Raises ShapeError, NonFiniteError, MetricError for an M that is not symmetric positive definite, ParameterError.
+    Raises ShapeError, NonFiniteError, MetricError for an M that is not symmetric positive definite, ParameterError,
+    where ``1/sigma^2`` overflows, too.
     """
     A = checks.matrix("J", J)
     m, n = A.shape
@@ -78,6 +81,8 @@ def cartesian_inertia(J: Any, M: Any, cutoff: float | None = None) -> CartesianI
     rank = numerical_rank(sigma, relative * scale(B))
     kept, s = axes[:, :rank], sigma[:rank]
     inertias = np.full(m, np.inf)
+    if rank and not (_SMALL < float(s[-1]) and float(s[0]) < 1.0 / _SMALL):
+        raise ParameterError(f"J L^-T has singular values from {s[-1]:g} to {s[0]:g}; expected J and M in SI units")
     inertias[:rank] = 1.0 / s**2
     half = kept / s  # Lambda = half half^T
     bar = np.zeros((n, m))

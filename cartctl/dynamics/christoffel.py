@@ -13,6 +13,7 @@ import pinocchio as pin
 
 from cartctl import checks
 from cartctl.checks import FloatArray
+from cartctl.dynamics.energy import require_state
 from cartctl.errors import UnsupportedJoint
 from cartctl.model.state import State
 
@@ -103,7 +104,7 @@ def _refuse_varying(state: State) -> None:
 
 def _refuse(state: State, kinds: tuple[str, ...], why: str) -> None:
     """Raise for a joint of one of the kinds; without kinds, for any whose axes turn with it."""
-    model = state.robot.model
+    model = require_state(state).robot.model
     for name, joint in zip(model.names[1:], model.joints[1:], strict=True):
         kind = joint.shortname()
         unknown = kind == "JointModelComposite" or (joint.nv != 1 and kind not in _CONSTANT)

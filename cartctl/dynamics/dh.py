@@ -75,7 +75,7 @@ class DHArm:
     gravity: Sequence[Entry] = (0.0, 0.0, -9.81)
 
     def __post_init__(self) -> None:
-        links = tuple(self.links)
+        links = tuple(checks.listed("links", self.links))
         if not links or not all(isinstance(link, DHLink) for link in links):
             raise ParameterError(f"links is {self.links!r}; expected one DHLink a joint, and at least one")
         object.__setattr__(self, "links", links)
@@ -85,6 +85,12 @@ class DHArm:
             raise ParameterError(
                 f"{min(taken)!r} stands in the table; expected another name, as q1, dq1, ... are taken"
             )
+
+    @staticmethod
+    def check(arm: Any) -> None:
+        """Refuse what is no DHArm; raises ParameterError."""
+        if not isinstance(arm, DHArm):
+            raise ParameterError(f"arm is a {type(arm).__name__}; expected a cc.dynamics.DHArm")
 
     @property
     def n(self) -> int:

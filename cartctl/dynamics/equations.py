@@ -6,12 +6,13 @@ from collections.abc import Callable, Sequence
 from functools import cached_property
 from typing import Any
 
+import numpy as np
 import sympy
 
 from cartctl import checks
 from cartctl.dynamics.functions import NumericEquations
 from cartctl.dynamics.printing import TextbookPrinter
-from cartctl.dynamics.textbook import compact
+from cartctl.dynamics.textbook import compact, spread
 from cartctl.errors import ParameterError
 
 
@@ -126,16 +127,18 @@ class Equations:
         without name; NonFiniteError.
         """
         given = {sympy.Symbol(name): checks.number(name, value) for name, value in values.items()}
-        parts = [sum(self._raw[k][1:], self._raw[k][0]) for k in ("T", "U")]
-        T, U = (self._compact(x) for x in parts)
-        wanted = set().union(*(x.free_symbols for x in (self.M, self.c, self.g, T, U))) - {*self.q, *self.dq}
+        # term by term: what makes them compact takes minutes for four joints at odd angles, and no number needs it
+        M, c, g, S = (
+            sympy.Matrix(*_shape(self._raw[k]), [spread(x) for x in np.ravel(self._raw[k])])
+            for k in ("M", "c", "g", "S")
+        )
+        energies = sympy.Matrix([spread(sum(self._raw[k][1:], self._raw[k][0])) for k in ("T", "U")])
+        wanted = set().union(*(x.free_symbols for x in (M, c, g, energies))) - {*self.q, *self.dq}
         missing, unknown = wanted - set(given), set(given) - {*self._masses, *self._order}
         if missing or unknown:
             what = f"{min(missing, key=str)} has no value" if missing else f"there is no {min(unknown, key=str)}"
             raise ParameterError(f"{what} among {sorted(values)}; expected one for each of {sorted(map(str, wanted))}")
-        return NumericEquations(
-            self.n, *(self._function(x.subs(given)) for x in (self.M, self.c, self.g, self.S, sympy.Matrix([T, U])))
-        )
+        return NumericEquations(self.n, *(self._function(x.subs(given)) for x in (M, c, g, S, energies)))
 
     def text(self, expression: Any) -> str:
         """An expression of these symbols as a textbook prints it: ``m2 l1 dc2 cos(q2)``."""
@@ -172,3 +175,8 @@ class Equations:
 
     def _function(self, value: Any) -> Callable[..., Any]:
         return sympy.lambdify([list(self.q), list(self.dq)], value, modules="numpy", cse=True)  # type: ignore[no-any-return]
+
+
+def _shape(array: Any) -> tuple[int, int]:
+    """Rows and columns; a vector is a column."""
+    return array.shape if array.ndim == 2 else (len(array), 1)

@@ -9,6 +9,7 @@ import numpy as np
 
 from cartctl import checks
 from cartctl.checks import FloatArray
+from cartctl.errors import ParameterError
 
 if TYPE_CHECKING:
     from cartctl.model.robot import Robot
@@ -38,7 +39,12 @@ class Friction:
 
     @classmethod
     def of(cls, robot: Robot, width: float = _WIDTH) -> Friction:
-        """What the robot's URDF says in ``<dynamics damping= friction=>``; zeros where it says nothing."""
+        """What the robot's URDF says in ``<dynamics damping= friction=>``; zeros where it says nothing.
+
+        Raises ParameterError for what is no Robot.
+        """
+        if not hasattr(robot, "model"):
+            raise ParameterError(f"robot is a {type(robot).__name__}; expected a Robot from cc.load(...)")
         return cls(np.array(robot.model.damping), np.array(robot.model.friction), width)
 
     def check(self, nv: int) -> None:
@@ -47,5 +53,5 @@ class Friction:
             checks.fits(f"friction: {name}", getattr(self, name), nv)
 
     def torque(self, v: FloatArray) -> FloatArray:
-        """``f(v)`` (nv,), N m or N; ``f . v >= 0`` is the power that is lost."""
+        """``f(v)`` (nv,), N m or N, for v (nv,), unchecked; ``f . v >= 0`` is the power that is lost."""
         return self.viscous * v + self.coulomb * np.tanh(v / self.width)  # type: ignore[no-any-return]

@@ -10,11 +10,13 @@ import numpy as np
 from cartctl import checks
 from cartctl.checks import FloatArray
 
+_LARGEST = 1e100  # of accelerations: what they are multiplied by leaves a number
+
 
 class NumericEquations:
     """The same equations for numbers: every method takes arrays (n,) and gives a fresh one.
 
-    Raises ShapeError, NonFiniteError.
+    Raises ShapeError, NonFiniteError, ParameterError for entries beyond 1e9.
     """
 
     def __init__(self, n: int, *functions: Callable[..., Any]) -> None:
@@ -47,7 +49,8 @@ class NumericEquations:
 
     def torque(self, q: Any, dq: Any, ddq: Any) -> FloatArray:
         """``M(q) ddq + c(q, dq) + g(q)`` (n,): inverse dynamics."""
-        return self.M(q) @ checks.vector("ddq", ddq, self.n) + self.c(q, dq) + self.g(q)
+        return self.M(q) @ checks.vector("ddq", ddq, self.n, largest=_LARGEST) + self.c(q, dq) + self.g(q)
 
     def _call(self, function: Callable[..., Any], q: Any, dq: Any) -> FloatArray:
-        return np.array(function(checks.vector("q", q, self.n), checks.vector("dq", dq, self.n)), dtype=np.float64)
+        posture, rates = (checks.vector(name, x, self.n, largest=checks.LARGEST) for name, x in (("q", q), ("dq", dq)))
+        return np.array(function(posture, rates), dtype=np.float64)

@@ -68,8 +68,7 @@ def check_inertia_matrix(
     """
     checks.choice("coordinates", coordinates, COORDINATES)
     matrix, size = _function(M, n)
-    if isinstance(samples, bool) or not isinstance(samples, int) or samples < 1:
-        raise ParameterError(f"samples is {samples!r}; expected a positive integer")
+    samples, seed = checks.whole("samples", samples, 1), checks.whole("seed", seed, 0)
     low = checks.vector("lower", np.full(size, -np.pi) if lower is None else lower, size)
     high = checks.vector("upper", np.full(size, np.pi) if upper is None else upper, size)
     if not (low <= high).all():
@@ -94,10 +93,12 @@ def _function(M: Any, n: int | None) -> tuple[Callable[[FloatArray], FloatArray]
         constant = checks.matrix("M", M)
         if constant.shape[0] != constant.shape[1] or not constant.size:
             raise ParameterError(f"M has shape {constant.shape}; expected (n, n)")
+        if n is not None and n != constant.shape[0]:
+            raise ParameterError(f"n is {n!r}, but M has shape {constant.shape}; leave n out where M is an array")
         return lambda q: constant, constant.shape[0]
-    if isinstance(n, bool) or not isinstance(n, int) or n < 1:
+    if isinstance(n, bool) or not isinstance(n, (int, np.integer)) or n < 1:
         raise ParameterError(f"n is {n!r}; expected the number of coordinates of the function M, a positive integer")
-    size = n
+    size = int(n)
 
     def value(q: FloatArray) -> FloatArray:
         return checks.matrix(f"M({np.array2string(q, precision=3)})", M(q.copy()), size, size)

@@ -8,6 +8,7 @@ with ``c_i = dq^T C_i dq``, ``C_i = 1/2 (dM_i/dq + (dM_i/dq)^T - dM/dq_i)``, ``g
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -28,9 +29,10 @@ def euler_lagrange(arm: DHArm) -> Equations:
     The coordinates are ``q1``, ..., their rates ``dq1``, ..., accelerations ``ddq1``, .... Numbers of the table become
     fractions, multiples of pi/2 (to 1e-12) exact. U is zero with every mass at the origin of frame 0.
 
-    Raises MissingDependencyError without SymPy.
+    Raises MissingDependencyError without SymPy, ParameterError where ``arm`` is no DHArm.
     """
     sympy = require_sympy()
+    DHArm.check(arm)
     from cartctl.dynamics.trigsum import Ground
 
     q, dq = _symbols(arm.n)
@@ -58,7 +60,8 @@ def euler_lagrange(arm: DHArm) -> Equations:
 def from_inertia_matrix(M: Sequence[Sequence[Any]], U: Any = 0.0) -> Equations:
     """c, g and the factorisations that belong to a given M(q), rows of formulas in q1, q2, ..., and potential U(q).
 
-    Raises ShapeError where M is not square, ParameterError where it is not symmetric, MissingDependencyError.
+    Raises ShapeError where M is not square, ParameterError where it is not symmetric or holds a coordinate it has not
+    or a rate, MissingDependencyError.
     """
     sympy = require_sympy()
     from cartctl.dynamics.trigsum import Ground
@@ -69,6 +72,12 @@ def from_inertia_matrix(M: Sequence[Sequence[Any]], U: Any = 0.0) -> Equations:
         raise ShapeError(f"M has rows of {[len(row) for row in rows]} entries; expected a square matrix")
     q, dq = _symbols(n)
     potential = entry("U", U)
+    used = set().union(*(names(x) for row in rows for x in row), names(potential))
+    beyond = sorted(name for name in used if re.fullmatch(r"d{0,2}q[0-9]+", name) and name not in map(str, q))
+    if beyond:
+        raise ParameterError(
+            f"{beyond[0]!r} stands in M or U; expected coordinates q1 to q{n} and no rates, as M is {n} x {n}"
+        )
     read = [[expression("M", x) for x in row] for row in rows]
     ground = Ground([*(x for row in read for x in row), expression("U", potential)], [*q, *dq])
     matrix = np.array([[ground.convert(x) for x in row] for row in read])

@@ -73,6 +73,7 @@ def moving_frames(arm: DHArm, q: Any, dq: Any) -> MovingFrames:
 
     Raises ParameterError where the table holds names, ShapeError, NonFiniteError.
     """
+    DHArm.check(arm)
     if arm.names:
         raise ParameterError(f"the table holds the names {sorted(arm.names)}; give them values by arm.with_values(...)")
     angles = checks.vector("q", q, arm.n, largest=checks.LARGEST)

@@ -77,7 +77,10 @@ def time_scaling(
         j = int(np.argmax(low > high))
         raise ParameterError(f"lower[{j}] is {low[j]:g}, above upper[{j}] = {high[j]:g}; expected lower <= upper")
     floor = checks.number("at_least", at_least, low=0.0)
-    inertial = total - still - drag
+    with np.errstate(over="ignore"):  # refused below
+        inertial = total - still - drag
+    if not np.isfinite(inertial).all():
+        raise ParameterError("torque - static - viscous is beyond the largest number; expected torques in N m or N")
     y, row = _fastest(_forbidden(inertial, drag, still, low, high), 1.0 / floor if floor > 0.0 else math.inf)
     sample, joint = (None, None) if row is None else divmod(row % total.size, n)
     if y is None:
@@ -90,8 +93,11 @@ def time_scaling(
 def motion_torques(robot: Robot, q: Any, v: Any, a: Any) -> tuple[FloatArray, FloatArray]:
     """``(torque, static)``, (N, nv) each, N m or N, along q (N, nq), v (N, nv), a (N, nv): rnea, and its gravity part.
 
-    As :func:`time_scaling` takes them; add friction to both. Raises ShapeError, NonFiniteError, ConfigurationError.
+    As :func:`time_scaling` takes them; add friction to both. Raises ShapeError, NonFiniteError, ConfigurationError,
+    ParameterError.
     """
+    if not isinstance(robot, Robot):
+        raise ParameterError(f"robot is a {type(robot).__name__}; expected a Robot from cc.load(...)")
     postures = checks.matrix("q", q, None, robot.nq)
     rates = checks.matrix("v", v, len(postures), robot.nv)
     accelerations = checks.matrix("a", a, len(postures), robot.nv)

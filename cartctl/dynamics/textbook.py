@@ -40,6 +40,17 @@ def compact(total: TrigSum, masses: Iterable[Any] = (), rates: Iterable[Any] = (
     return sympy.Add(*(term.xreplace(ground.lumps) for term in terms))
 
 
+def spread(total: TrigSum) -> Any:
+    """The same sum as a SymPy expression term by term, for numbers: what :func:`compact` folds is not looked for."""
+    ground = total.ground
+    terms = (
+        ground.coefficient(p) * _wave(ground, (sine, f))
+        for f, pair in total.terms.items()
+        for sine, p in zip((False, True), pair, strict=True)
+    )
+    return sympy.Add(*(term.xreplace(ground.lumps) for term in terms))
+
+
 def _wave(ground: Ground, wave: Wave) -> Any:
     return (sympy.sin if wave[0] else sympy.cos)(ground.frequency(wave[1]))
 

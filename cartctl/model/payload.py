@@ -26,7 +26,8 @@ class Payload:
     mass: kg >= 0. com: its centre of mass in the axes of the frame, (3,), m. inertia: about the centre of mass, in the
     axes of the frame, (3, 3), kg m^2; None for a point mass. frame: None for the robot's tool.
 
-    Raises ParameterError, ShapeError, NonFiniteError, MetricError for an inertia that no body has.
+    Raises ShapeError, NonFiniteError, MetricError for an inertia that no body has, ParameterError, for numbers beyond
+    1e9, too.
     """
 
     mass: float
@@ -35,8 +36,8 @@ class Payload:
     frame: str | None = None
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "mass", checks.number("mass", self.mass, low=0.0))
-        object.__setattr__(self, "com", checks.vector("com", self.com, 3))
+        object.__setattr__(self, "mass", checks.number("mass", self.mass, low=0.0, high=checks.LARGEST))
+        object.__setattr__(self, "com", checks.vector("com", self.com, 3, largest=checks.LARGEST))
         if self.inertia is not None:
             object.__setattr__(self, "inertia", _checked(checks.matrix("inertia", self.inertia, 3, 3)))
 
@@ -49,6 +50,8 @@ class Payload:
 def _checked(inertia: FloatArray) -> FloatArray:
     """An inertia: symmetric, and no principal moment above the sum of the others."""
     size = float(np.abs(inertia).max())
+    if size > checks.LARGEST:
+        raise ParameterError(f"inertia has an entry of size {size:g}; expected at most {checks.LARGEST:g} kg m^2")
     moments = np.linalg.eigvalsh(0.5 * (inertia + inertia.T))
     asymmetry = float(np.abs(inertia - inertia.T).max())
     slack = _SYMMETRY * size

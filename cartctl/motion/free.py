@@ -76,6 +76,6 @@ def free_motion(
 
 def _drive(torque: Any, nv: int) -> Torque:
     if callable(torque):
-        return lambda t, q, v: checks.vector(f"the torque at t = {t:g} s", torque(t, q, v), nv)
-    fixed = np.zeros(nv) if torque is None else checks.vector("torque", torque, nv)
+        return lambda t, q, v: checks.vector(f"the torque at t = {t:g} s", torque(t, q, v), nv, largest=checks.LARGEST)
+    fixed = np.zeros(nv) if torque is None else checks.vector("torque", torque, nv, largest=checks.LARGEST)
     return lambda t, q, v: fixed

@@ -23,7 +23,8 @@ class Plant:
     """The robot that is really there, where it differs from the model: ``cc.simulate(..., plant=cc.Plant(...))``.
 
     robot: another Robot with the same joints; None for the controller's. payload: a Payload, or a sequence, that the
-    robot holds beside what its model says. masses: a factor > 0 on mass and inertia of all links. friction: instead
+    robot holds beside what its model says. masses: a factor > 0 on mass and inertia of all links
+    of the model, not on ``payload``, not on rotors. friction: instead
     of the one the controller's level knows of; None for that one, ``cc.Friction()`` for none. wrenches: what acts on
     the robot beside the wrenches the level knows of. noise: standard deviation of the torques, N m or N, a number or
     (nv,), drawn anew each step of the controller from ``seed``.
@@ -63,10 +64,10 @@ class Plant:
             raise ShapeError(
                 f"the plant has the joints {real.dof_names}; expected {robot.dof_names}, as the controller"
             )
-        for payload in self.payloads:
-            real = real.carrying(payload)
         if self.masses != 1.0:
             real = _scaled(real, self.masses)
+        for payload in self.payloads:  # last: a payload weighs what it says
+            real = real.carrying(payload)
         known = Loads() if loads is None else loads
         friction = known.friction if self.loads.friction is None else self.loads.friction
         every = Loads(friction, (*known.wrenches, *self.loads.wrenches))

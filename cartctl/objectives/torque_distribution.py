@@ -12,7 +12,7 @@ from cartctl.checks import FloatArray
 from cartctl.model.robot import Robot
 from cartctl.model.state import State
 from cartctl.objectives.gravity_torque import GravityTorque
-from cartctl.spatial import cross, skew
+from cartctl.spatial.rotations import cross, skew
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -24,8 +24,9 @@ from cartctl.spatial.frames import (
 )
 from cartctl.spatial.motions import ad, exp6, hat, log6, vee
 from cartctl.spatial.pose_error import pose_error
-from cartctl.spatial.rotations import cross, exp3, log3, rotation_about, skew
+from cartctl.spatial.rotations import exp3, log3
 from cartctl.spatial.screws import Screw, displacement_screw, twist_screw, wrench_screw
+from cartctl.spatial.vectors import cross, rotation_about, skew
 
 __all__ = [
     "EULER_SEQUENCES",

@@ -18,8 +18,7 @@ from scipy.spatial.transform import Rotation
 
 from cartctl import checks
 from cartctl.checks import FloatArray
-from cartctl.errors import ParameterError
-from cartctl.spatial.rotations import cross
+from cartctl.spatial.rotations import checked_rotation, cross
 
 EULER_SEQUENCES = tuple("".join(s) for s in product("XYZ", repeat=3) if s[0] != s[1] and s[1] != s[2])
 
@@ -53,17 +52,14 @@ def euler_angles(sequence: str, R: FloatArray, about: str = "moving") -> FloatAr
     """The angles phi (3,) of rotation R (3, 3); at a gimbal lock one of the many, with the third angle zero.
 
     phi_2 lies in [0, pi] for sequences like ZYZ and in [-pi/2, pi/2] for sequences like XYZ, the others in [-pi, pi].
-    Errors as of :func:`euler_rotation`.
+    Errors as of :func:`euler_rotation`; ParameterError where R is no rotation.
     """
     checks.choice("sequence", sequence, EULER_SEQUENCES)
     name = sequence if checks.choice("about", about, _ABOUT) == "moving" else sequence.lower()
-    R = checks.matrix("R", R, 3, 3)
+    R = checked_rotation("R", R)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # the lock is reported by euler_lock
-        try:
-            return Rotation.from_matrix(R).as_euler(name)  # type: ignore[no-any-return]
-        except ValueError:
-            raise ParameterError(f"R has the determinant {np.linalg.det(R):.3g}; expected a rotation matrix") from None
+        return Rotation.from_matrix(R).as_euler(name)  # type: ignore[no-any-return]
 
 
 def euler_rates(sequence: str, phi: Any, about: str = "moving", axes: str = "base") -> FloatArray:

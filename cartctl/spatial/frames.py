@@ -23,15 +23,19 @@ from cartctl.spatial.rotations import checked_rotation, skew
 
 _ORDERS = ("linear-first", "angular-first")
 _LAST = np.array([0.0, 0.0, 0.0, 1.0])
+_LARGEST = 1e150  # m, and of a twist or wrench: products of two of them are numbers still
 
 
-def velocity_conversion(R: FloatArray, p: FloatArray) -> FloatArray:
+def velocity_conversion(R: Any, p: Any) -> FloatArray:
     """``V`` (6, 6): the twist of frame B in B's axes = V times the twist of frame A in A's axes, one rigid body.
 
     R (3, 3), p (3,): the pose of B in A, ``^A T_B``. ``V = [[R^T, -R^T S(p)], [0, R^T]]``, the inverse of
     :func:`adjoint`. Column j of a Jacobian in tool axes is the column of V from joint frame j that belongs to the
     joint's axis: 5 for a revolute joint about z, 2 for a prismatic one along z, 3 + i and i for the axes x, y.
+
+    Raises ParameterError for an R that is no rotation, ShapeError, NonFiniteError.
     """
+    R, p = checked_rotation("R", R), checks.vector("p", p, 3, largest=_LARGEST)
     V = np.zeros((6, 6))
     V[:3, :3] = V[3:, 3:] = R.T
     V[:3, 3:] = -R.T @ skew(p)
@@ -47,7 +51,7 @@ def pose(R: Any = None, p: Any = None) -> FloatArray:
     if R is not None:
         T[:3, :3] = checked_rotation("R", R)
     if p is not None:
-        T[:3, 3] = checks.vector("p", p, 3)
+        T[:3, 3] = checks.vector("p", p, 3, largest=_LARGEST)
     return T
 
 
@@ -117,6 +121,7 @@ def as_pose(name: str, value: Any) -> FloatArray:
     if not np.array_equal(T[3], _LAST):
         raise ParameterError(f"{name} has the last row {T[3]}; expected a pose with the last row 0 0 0 1")
     checked_rotation(name, T[:3, :3])
+    _moderate(f"{name}: its origin", T[:3, 3])
     return T
 
 
@@ -132,4 +137,13 @@ def _six(name: str, value: Any) -> FloatArray:
     array = checks.floats(name, value)
     if array.ndim not in (1, 2) or array.shape[0] != 6:
         raise ShapeError(f"{name} has shape {array.shape}; expected (6,) or columns (6, n)")
-    return checks.vector(name, array, 6) if array.ndim == 1 else checks.matrix(name, array, 6)
+    array = checks.vector(name, array, 6) if array.ndim == 1 else checks.matrix(name, array, 6)
+    _moderate(name, array)
+    return array
+
+
+def _moderate(name: str, array: FloatArray) -> None:
+    """Refuse what overflows where two of them are multiplied; raises ParameterError."""
+    most = float(np.abs(array).max(initial=0.0))
+    if most > _LARGEST:
+        raise ParameterError(f"{name} has an entry of size {most:g}; expected at most {_LARGEST:g}")

@@ -11,20 +11,24 @@ from cartctl import checks
 from cartctl.algebra.metric import Whitening, as_metric
 from cartctl.algebra.svd import floor, numerical_rank, svd
 from cartctl.checks import FloatArray
+from cartctl.errors import ParameterError
 
 
 def exerting_torques(J: Any, wrench: Any) -> FloatArray:
     """``tau = J^T w``, (n,): the joint torques with which the hand pushes its surroundings with the wrench w (m,).
 
     J: (m, n). At rest, without gravity: add ``state.gravity`` to carry the arm's own weight. Prismatic joints have
-    forces. Raises ShapeError, NonFiniteError.
+    forces. Raises ShapeError, NonFiniteError, ParameterError where the torques overflow.
 
     >>> from cartctl import statics
     >>> print(statics.exerting_torques([[0.0, 0.0], [1.0, 0.5]], [3.0, 2.0]))
     [2. 1.]
     """
     J = checks.matrix("J", J)
-    torque: FloatArray = J.T @ checks.vector("wrench", wrench, J.shape[0])
+    with np.errstate(over="ignore", invalid="ignore"):  # refused below
+        torque: FloatArray = J.T @ checks.vector("wrench", wrench, J.shape[0])
+    if not np.isfinite(torque).all():
+        raise ParameterError("J^T w is beyond the largest number; expected J and wrench in SI units")
     return torque
 
 
@@ -72,11 +76,14 @@ def balanced_wrench(J: Any, torque: Any, metric: Any = None, tolerance: float | 
     rank = numerical_rank(s, floor(A, tolerance))
     range_ = U[:, :rank]
     parts = range_.T @ torque
-    y = Vt[:rank].T @ (parts / s[:rank])
+    with np.errstate(over="ignore", invalid="ignore"):  # refused below
+        y = Vt[:rank].T @ (parts / s[:rank])
     rest = torque - range_ @ parts
     rest -= range_ @ (range_.T @ rest)  # once more: the first difference leaves round-off of the size of tau
     null = Vt[rank:]
     if whitening is not None:
         y = whitening.back(y)
         null = np.array([whitening.back(np.ascontiguousarray(z)) for z in null]).reshape(null.shape)
+    if not (np.isfinite(y).all() and np.isfinite(rest).all()):
+        raise ParameterError("the wrench is beyond the largest number; expected J and torque in SI units")
     return Balance(y, null.T, rest)

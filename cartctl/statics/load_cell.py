@@ -12,9 +12,9 @@ from cartctl import checks
 from cartctl.algebra.svd import numerical_rank, round_off, svd
 from cartctl.checks import FloatArray
 from cartctl.errors import ParameterError
-from cartctl.spatial import cross, move_wrench, skew, wrench_adjoint
+from cartctl.spatial import move_wrench, wrench_adjoint
 from cartctl.spatial.frames import as_pose
-from cartctl.spatial.rotations import checked_rotation
+from cartctl.spatial.rotations import checked_rotation, cross, skew
 
 GRAVITY = (0.0, 0.0, -9.81)
 _NOTHING = 1e-9  # of the readings: no weight, and no centre of mass

@@ -10,7 +10,7 @@ from cartctl.algebra.svd import scale
 from cartctl.checks import FloatArray
 from cartctl.model.robot import Robot
 from cartctl.model.state import State
-from cartctl.spatial import cross, skew
+from cartctl.spatial.rotations import cross, skew
 from cartctl.tasks.pose import PoseTask
 
 
