@@ -111,7 +111,8 @@ def check_proofs(
             margin = min(value, at_zero)
             residuals[k, GAP] = 0.0 if margin > _CLEAR * total + unsure else 1.0
         elif scales[k] < 1.0:
-            residuals[k, GAP] = abs(value) / slope if slope > 0.0 else np.inf
+            # h is known no better than what does not cancel, times u
+            residuals[k, GAP] = max(abs(value) - n * rest * size, 0.0) / slope if slope > 0.0 else np.inf
 
 
 @part
