@@ -94,7 +94,7 @@ def check_proofs(
                 added = max(added, _turn(own, z[j], x, low, high, level, holder, j, span))
         rest, terms = _stationarity(A, C, own, span, n, force, k == p)
         terms = max(terms, added)
-        slack, value, slope, total, unsure = _value(own, x, low, high, level, b, k, span)
+        slack, value, slope, total, unsure = _value(own, x, low, high, level, fits, b, k, span)
         if k == p:
             terms = max(terms, _COARSE * pull, least)
         elif fits[k] != SCALED:
@@ -311,13 +311,14 @@ def _value(
     low: FloatArray,
     high: FloatArray,
     level: NDArray[np.int64],
+    fits: NDArray[np.int64],
     b: FloatArray,
     k: int,
     span: FloatArray,
 ) -> tuple[float, float, float, float, float]:
     """Complementarity ``sum |z_i| slack_i``, h at the present scale (1 if skipped), its slope and terms.
 
-    Last, what of h is due to rows of levels above that are met only so well.
+    Last, what of h is due to rows of scaled levels above that are met only so well.
     """
     slack, value, slope, total, unsure, most = 0.0, 0.0, 0.0, 0.0, 0.0, _largest(own, span)
     for i in range(x.shape[0]):
@@ -332,7 +333,7 @@ def _value(
             side = low[i] if level[i] < 0 else x[i]
             value += own[i] * side
             total += abs(own[i] * side)
-            if low[i] == high[i]:
+            if level[i] >= 0 and fits[level[i]] == SCALED:
                 unsure += abs(own[i] * (x[i] - low[i]))
             continue
         if level[i] == k:
