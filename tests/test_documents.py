@@ -48,6 +48,12 @@ def result(name: str, **where: str) -> dict[str, str]:
     return row
 
 
+def test_the_how_to_index_names_every_page_by_its_title() -> None:
+    listed = dict(re.findall(r"^- \[(.+)\]\(how-to/(.+)\.md\)$", (ROOT / "docs/guide.md").read_text(), re.MULTILINE))
+    titles = {p.read_text().splitlines()[0].removeprefix("# "): p.stem for p in (ROOT / "docs/how-to").glob("*.md")}
+    assert listed == titles
+
+
 def test_the_readmes_race_is_the_files() -> None:
     """Each figure as the file has it, rounded as the sentence has it."""
     text = " ".join((ROOT / "README.md").read_text().split())
