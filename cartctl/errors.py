@@ -134,6 +134,7 @@ class LookupFailure(CartctlError, KeyError):  # noqa: N818 - an intermediate bas
     """A name is unknown; the closest known names are offered."""
 
     kind = "name"
+    shown = 12  # how many of the known names are listed where none is close
 
     def __init__(self, name: object, known: Iterable[str], advice: str = "") -> None:
         known = list(known)
@@ -141,7 +142,7 @@ class LookupFailure(CartctlError, KeyError):  # noqa: N818 - an intermediate bas
         if close:
             offer = "did you mean " + " or ".join(repr(c) for c in close) + "?"
         else:
-            offer = "known: " + ", ".join(known[:12]) + (", ..." if len(known) > 12 else "")
+            offer = "known: " + ", ".join(known[: self.shown]) + (", ..." if len(known) > self.shown else "")
         super().__init__(f"unknown {self.kind} {name!r}; {offer}" + (f" {advice}" if advice else ""))
         self.name, self.close = name, close
 
@@ -171,6 +172,7 @@ class SolverNotFound(LookupFailure):
     """No solver is registered under that name."""
 
     kind = "solver"
+    shown = 40  # all of them: who asks cannot know where else to look
 
 
 class LevelNotFound(LookupFailure):

@@ -14,8 +14,11 @@ from cartctl.errors import FileError, ParameterError
 def whole_file(path: str | os.PathLike[str]) -> Iterator[Path]:
     """Yield a temporary path beside ``path`` to write to; it becomes ``path`` only if all goes well.
 
-    Missing folders are made. Raises ParameterError if ``path`` is a folder, FileError if it cannot be written.
+    Missing folders are made. Raises ParameterError if ``path`` is a folder or no path,
+    FileError if it cannot be written.
     """
+    if not isinstance(path, (str, os.PathLike)):
+        raise ParameterError(f"path is {path!r}; expected the name of a file, such as 'out/run.html'")
     target = Path(path)
     if target.is_dir():
         raise ParameterError(f"path is the folder {str(target)!r}; expected the name of a file in it")

@@ -48,7 +48,7 @@ def test_without_limits(arm: str, plain: None) -> None:  # noqa: F811
     [
         (("--objective", "energy"), "unknown objective"),
         (("--objective", "joint-speed", "--samples", "2"), "samples is 2"),
-        ((), "plan with objective='joint-speed'"),
+        ((), "plan with the objective 'joint-speed'"),
         (("--radius", "-1"), "--radius"),
     ],
 )

@@ -453,6 +453,12 @@ def test_compare_runs_and_writes_what_it_names(folder: Path) -> None:
     assert "for 1 of 3, the others have no null-space term" in re.sub(r"\s+", " ", result.stdout)
 
 
+def test_an_objective_that_leads_no_solver_is_said_to_lead_none(folder: Path, plain: None) -> None:
+    result = compare("--solvers", "pinv,transpose", "--dt", "0.01", "--period", "1")
+    assert result.exit_code == 0, result.output
+    assert "objective none, since no solver here has a null-space term" in re.sub(r"\s+", " ", result.stdout)
+
+
 def test_all_solvers_are_the_default(folder: Path, plain: None) -> None:
     result = compare(*QUICK)
     assert result.exit_code == 0, result.output

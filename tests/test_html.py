@@ -123,6 +123,9 @@ def test_a_failed_write_leaves_the_old_file_alone(planar: Any, tmp_path: Path, m
 
 
 def test_refuses_a_folder_and_a_run_without_samples(planar: Any, tmp_path: Path) -> None:
+    for path in (None, 3, b"page.html"):
+        with pytest.raises(ParameterError, match="path is .*; expected the name of a file"):
+            write_html(planar, path)  # type: ignore[arg-type]
     with pytest.raises(ParameterError, match="folder"):
         write_html(planar, tmp_path)
     empty = planar_run()

@@ -82,6 +82,8 @@ class Contest:
         if self.goal is None:
             return "none"
         led = [name for name, controller in self.controllers.items() if controller.objective is not None]
+        if not led:
+            return "none, since no solver here has a null-space term"
         rest = "" if len(led) == self.size else f"; for {len(led)} of {self.size}, the others have no null-space term"
         return in_words(self.goal) + rest
 

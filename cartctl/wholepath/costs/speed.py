@@ -97,7 +97,7 @@ class PathEnergy(PathCost):
         if not has_inertia(robot):
             raise ParameterError(
                 f"{robot.name!r} has a singular mass matrix at home (a URDF without masses?), so that its kinetic "
-                "energy says nothing; plan with objective='joint-speed'"
+                "energy says nothing; plan with the objective 'joint-speed'"
             )
 
     def pace(self, state: State) -> FloatArray:
