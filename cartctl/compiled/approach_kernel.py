@@ -32,6 +32,7 @@ from cartctl.levels.approach_kernel import (
     hold,
     matters,
 )
+from cartctl.levels.left_out import stands
 
 _BENT, _BENDS, _CLEAR = 1e-3, 0.5, 1e-2  # as in levels.approach
 _NO_FREEDOM = 1e-9  # as in levels.calming
@@ -218,9 +219,7 @@ def _left_out(
     for j in range(n):
         out = False
         if lower.shape[0] > 0:
-            still = joints[_STILL, j]
-            beyond = upper[j] if wanted[j] > 0.0 else -lower[j]
-            out = wanted[j] != 0.0 and beyond <= still and (beyond >= -still or not moving)
+            out = stands(wanted[j], lower[j], upper[j], joints[_STILL, j], moving)
         if out and not found:
             found = True
             for i in range(m):

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from cartctl.checks import FloatArray
-from cartctl.kernels import part
+from cartctl.kernels import lean_part, part
 
 _STILL = 2  # row of the joints' array: a bound this close to zero blocks
 _AT_BOUND = 1e3  # times that: where a row of C blocks, for its bound moves with the configuration
@@ -33,22 +33,27 @@ def leave_out(
     size: float,
     moving: bool,
 ) -> bool:
-    """Change A (m, n); whether anything was left out.
-
-    A joint on its way back, whose bounds do not even let it stop, is left out like one that stands; not while the
-    target moves: there, a motion of the null space would hold the hand back.
-    """
+    """Change A (m, n); whether anything was left out."""
     n = A.shape[1]
     wanted = _wanted(left, s, right, b, size)
     found, out = False, np.zeros(n)
     for j in range(n):
-        still = joints[_STILL, j]
-        beyond = upper[j] if wanted[j] > 0.0 else -lower[j]
-        if wanted[j] != 0.0 and beyond <= still and (beyond >= -still or not moving):
+        if stands(wanted[j], lower[j], upper[j], joints[_STILL, j], moving):
             A[:, j] = 0.0
             out[j] = 1.0
             found = True
     return _leave_rows_out(A, wanted, joints, out, C, c_lower, c_upper) or found
+
+
+@lean_part
+def stands(wanted: float, lower: float, upper: float, still: float, moving: bool) -> bool:
+    """Whether a joint's bounds keep it from what is wanted of it.
+
+    A joint on its way back, whose bounds do not even let it stop, counts like one that stands; not while the target
+    moves: there, a motion of the null space would hold the hand back.
+    """
+    beyond = upper if wanted > 0.0 else -lower
+    return wanted != 0.0 and beyond <= still and (beyond >= -still or not moving)
 
 
 @part
