@@ -132,8 +132,9 @@ def _kernels() -> Finding:
 
 def _cache() -> Finding:
     from cartctl.kernel_cache import cache_folder
+    from cartctl.solvers import dls
 
-    folder = cache_folder(Path(__file__))
+    folder = cache_folder(Path(dls.__file__))  # of the kernel that has just been tried
     if folder:
         return Finding("ok", "kernel cache", str(folder.parent))
     trouble = "not writable, so every process compiles anew"

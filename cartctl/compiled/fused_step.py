@@ -6,7 +6,7 @@ Problem, references and Solution are put together when somebody asks a command f
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -22,8 +22,6 @@ from cartctl.compiled.step_kernel import BITS, LEFT, OUTCOME, step_dls, step_ran
 from cartctl.compiled.told import FusedCommand, Told
 from cartctl.compiled.workspace import Workspace
 from cartctl.errors import UnsupportedProblem
-from cartctl.model.robot import Robot
-from cartctl.solvers import Solver
 from cartctl.tasks import FrameTask, Task
 
 _FLOAT = np.dtype(np.float64)
@@ -31,21 +29,13 @@ _REFUSED = BITS * REFUSED
 
 
 class FusedStep:
-    """For one controller; arguments as of :class:`Workspace`, which raises what cannot be done this way."""
+    """For one controller, on a store of its own."""
 
-    def __init__(
-        self,
-        robot: Robot,
-        tasks: Sequence[Task],
-        solver: Solver,
-        packed: FloatArray | None,
-        joints: FloatArray | None,
-        waits: Sequence[bool],
-        dt: float,
-    ) -> None:
-        self.tasks, self.solver = tasks, solver
-        self._robot, self._store = robot, Workspace(robot, tasks, solver, packed, joints, waits, dt)
-        self.lasting = Lasting(self._store)
+    def __init__(self, store: Workspace) -> None:
+        robot, tasks = store.robot, store.tasks
+        self.tasks, self.solver = tasks, store.solver
+        self._robot, self._store = robot, store
+        self.lasting = Lasting(store)
         code = self._store.ints[at.SOLVER]
         kernel = step_sns if code == SNS else step_dls if code == DLS else step_ranks
         self._kernel: Callable[..., int] = kernel.compiled
@@ -53,7 +43,6 @@ class FusedStep:
         self._shape, self._rates = (robot.nq,), (robot.nv,)
         self._still = np.zeros(robot.nv)
         self._nv, self._size = robot.nv, told_size(robot.nv, len(tasks), self._store.rows)
-        self._bounded = packed is not None
         self._seen, self._latest = [-1] * len(tasks), -1
         self._expressed = self._take_over()
 
@@ -130,7 +119,7 @@ class FusedStep:
         named = [(task.fit, task.weight, task.name) for task in self.tasks]
         moving = [isinstance(task, FrameTask) and task.path is not None for task in self.tasks]
         scaled = store.ints[at.SOLVER] == SNS
-        self._told = Told(self._nv, parts, named, moving, self._bounded, scaled, self.solver)
+        self._told = Told(self._nv, parts, named, moving, store.bounded, scaled, self.solver)
         return True
 
     def _sample(self, t: float) -> bool:

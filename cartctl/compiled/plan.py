@@ -20,7 +20,6 @@ from cartctl.compiled.path_table import ROW, path_table, samples
 from cartctl.compiled.rollout_kernel import roll
 from cartctl.compiled.workspace import Workspace
 from cartctl.model.robot import Robot
-from cartctl.solvers import Solver
 from cartctl.tasks import FrameTask, Task
 
 
@@ -60,25 +59,13 @@ class Outcome:
 
 
 class Loop:
-    """The arrays of one controller's loop over ``steps`` steps from ``t0``.
+    """The arrays of one controller's loop over ``steps`` steps from ``t0``, on a store of its own.
 
-    packed, joints: the limits as :class:`VelocityBounds` and :class:`Approach` hold them, None without. waits: (p,)
-    whose paths wait for the hand. Raises UnsupportedProblem, UnsupportedJoint with the reason.
+    Raises UnsupportedProblem for a path that cannot be sampled ahead.
     """
 
-    def __init__(
-        self,
-        robot: Robot,
-        tasks: Sequence[Task],
-        solver: Solver,
-        packed: FloatArray | None,
-        joints: FloatArray | None,
-        waits: Sequence[bool],
-        dt: float,
-        t0: float,
-        steps: int,
-    ) -> None:
-        store = Workspace(robot, tasks, solver, packed, joints, waits, dt)
+    def __init__(self, store: Workspace, t0: float, steps: int) -> None:
+        robot, tasks, dt = store.robot, store.tasks, store.floats.item(at.DT)
         times: FloatArray = t0 + dt * np.arange(steps + 1, dtype=np.float64)
         tables: list[FloatArray] = []
         for k, task in enumerate(tasks):
@@ -86,7 +73,7 @@ class Loop:
                 path, name = task.path, f"task {task.name!r}"
                 store.each[at.OPEN_ROTATION, k] = task.goal(float(times[0])).rotation is None
                 store.each[at.PATH, k] = len(tables)
-                tables.append(path_table(path, times, name) if waits[k] else samples(path, times, name))
+                tables.append(path_table(path, times, name) if store.waits[k] else samples(path, times, name))
         store.ints[at.STEPS], store.floats[at.START] = steps, t0
         self.steps, self.sizes = steps, (robot.nq, robot.nv, store.rows, len(tasks))
         self._fixed = (

@@ -54,7 +54,13 @@ class Workspace:
         dt: float,
     ) -> None:
         tree, (code, parameter) = tree_of(robot), _solver(solver)
-        self.robot, self.tasks = robot, tuple(tasks)
+        self.robot, self.tasks, self.solver, self.waits, self.bounded = (
+            robot,
+            tuple(tasks),
+            solver,
+            waits,
+            packed is not None,
+        )
         index = [_rows_of(task, robot) for task in tasks]
         counts = [len(rows) for rows in index]
         n, p, m, r = robot.nv, len(tasks), sum(counts), max(6, *counts)

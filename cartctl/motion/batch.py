@@ -89,7 +89,7 @@ def _loop(controller: Controller, t0: float, steps: int) -> Loop:
     """The controller's loop as arrays; raises UnsupportedProblem, UnsupportedJoint with what is not compiled."""
     if controller.level.name != "velocity":
         raise UnsupportedProblem(f"level {controller.level.name!r} is not compiled ('velocity' is)")
-    packed, braking, waits = controller.compiled_limits()
+    store = controller.workspace()
     for what, given in (
         ("an objective", controller.objective),
         (
@@ -100,7 +100,7 @@ def _loop(controller: Controller, t0: float, steps: int) -> Loop:
     ):
         if given is not None:
             raise UnsupportedProblem(f"{what} is not compiled: {type(given).__name__}")
-    return Loop(controller.robot, controller.tasks, controller.solver, packed, braking, waits, controller.dt, t0, steps)
+    return Loop(store, t0, steps)
 
 
 def _compiled(loop: Loop, starts: FloatArray, rates: FloatArray, history: bool, threads: int) -> Outcome:

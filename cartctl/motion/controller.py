@@ -14,6 +14,7 @@ from cartctl.algebra.solution import Solution, Status
 from cartctl.checks import LARGEST, FloatArray, is_moderate
 from cartctl.compiled.fused_step import FusedStep
 from cartctl.compiled.lasting import Memory
+from cartctl.compiled.workspace import Workspace
 from cartctl.constraints import Constraint
 from cartctl.errors import (
     ParameterError,
@@ -180,14 +181,15 @@ class Controller:
         if self._stroke is None:
             confining.prepare()
 
-    def compiled_limits(self) -> tuple[FloatArray | None, FloatArray | None, list[bool]]:
-        """What a compiled loop needs to know of the limits: (11, nv), (3, nv) of the approach, and whose paths wait.
+    def workspace(self) -> Workspace:
+        """A store for compiled loops, as before the first step.
 
-        Raises UnsupportedProblem for what such a loop does not hold: constraints, jerk limits, approaches of others.
+        Raises UnsupportedProblem, UnsupportedJoint for what such a loop does not hold: constraints, jerk limits,
+        approaches of others, other tasks and solvers.
         """
         packed, braking = self._confining.compiled()
         waits = [task in self._waiting for task in self.tasks]
-        return packed, braking, waits
+        return Workspace(self.robot, self.tasks, self.solver, packed, braking, waits, self.dt)
 
     def _confined_by(self, limits: Limits | None) -> Confining:
         given = (self._constraints, self._disabled, self._jerk, self._approach)
@@ -209,8 +211,7 @@ class Controller:
         if self.objective is not None or self._guard.policy is not None:
             return None
         try:
-            packed, braking, waits = self.compiled_limits()
-            return FusedStep(self.robot, self.tasks, self.solver, packed, braking, waits, self.dt)
+            return FusedStep(self.workspace())
         except (UnsupportedProblem, UnsupportedJoint):
             return None
 

@@ -26,7 +26,6 @@ from cartctl.solvers.exact.lexicographic import lexicographic
 _KINDS = {"scale": SCALED, "least_squares": FITTED, "inequality": INTERVAL}
 _CLAIMS = {SCALED: "scale", FITTED: "least squares", INTERVAL: "least squares"}
 
-_PROVEN = 1e-7  # residuals of a certificate that is good enough
 _EMPTY = np.zeros(0)
 _NO_ROWS = np.zeros((0, 0))
 _NO_GUESS = np.zeros(1, dtype=np.int64)
@@ -224,23 +223,20 @@ def certificate(solution: Solution, fitted: bool) -> Certificate:
     pull, reach = float(weighed(None if W is None else np.abs(W), sizes).max()), float(sizes.max())
     arguments = (given.A, given.b, given.d, given.sizes, given.fits, given.natural, given.lower, given.upper)
     rows = (given.C, given.c_lower, given.c_upper)
-    guess = _NO_GUESS if solution.warm is None else solution.warm
-    best: tuple[float, FloatArray, FloatArray] | None = None
-    for start in (_NO_GUESS, guess):  # any proof will do: those of the way the answer came, if others do not
-        proofs, residuals = _proofs(arrays, problem, np.zeros((p + 1, M + problem.n + r)), start), np.zeros((p + 1, 3))
-        check_proofs.compiled(*arguments, *rows, force, pull, reach, u, scales, proofs, residuals)
-        worst = float(np.nan_to_num(residuals, nan=np.inf).max())
-        if best is None or worst < best[0]:
-            best = (worst, proofs, residuals)
-        if best[0] <= _PROVEN or guess[0] == 0:
-            break
-    assert best is not None
-    _, proofs, residuals = best
     claims = ["skipped" if s != s else _CLAIMS[int(kind)] for s, kind in zip(scales, given.fits, strict=True)]
-    levels = zip([*names, "reference"], [*claims, "nearest"], residuals.tolist(), proofs, strict=True)
-    return Certificate(
-        tuple(LevelCertificate(name, claim, three[0], three[1], three[2], z) for name, claim, three, z in levels)
-    )
+
+    def from_start(guess: NDArray[np.int64]) -> Certificate:
+        """By the multipliers that are found from that guess."""
+        proofs, residuals = _proofs(arrays, problem, np.zeros((p + 1, M + problem.n + r)), guess), np.zeros((p + 1, 3))
+        check_proofs.compiled(*arguments, *rows, force, pull, reach, u, scales, proofs, residuals)
+        levels = zip([*names, "reference"], [*claims, "nearest"], residuals.tolist(), proofs, strict=True)
+        return Certificate(tuple(LevelCertificate(name, claim, x[0], x[1], x[2], z) for name, claim, x, z in levels))
+
+    cold = from_start(_NO_GUESS)
+    if cold.holds() or solution.warm is None or solution.warm[0] == 0:
+        return cold
+    own = from_start(solution.warm)  # any proof will do: those of the way the answer came, if others do not
+    return own if own.worst < cold.worst else cold
 
 
 def _proofs(arrays: Given, problem: Problem, proofs: FloatArray, guess: NDArray[np.int64]) -> FloatArray:
