@@ -1,9 +1,10 @@
 """Random problems and random closed-loop steps on all cores, every answer checked by its certificate.
 
     make soak MINUTES=10
-    python benchmarks/soak.py --minutes 10 --share 0.5      # of the time, the problems' part
+    python benchmarks/soak.py --minutes 10 --parts 6 4 1    # of the time: problems, closed loops, compiled rollouts
     python benchmarks/soak.py --problem SEED INDEX          # one problem again
     python benchmarks/soak.py --scene SEED INDEX            # one closed loop again
+    python benchmarks/soak.py --rollouts SEED INDEX         # one controller's compiled rollouts again
 
 A line with counts, rates and worst figures is appended to benchmarks/results/soak.csv, on Ctrl-C too.
 """
@@ -22,12 +23,13 @@ import numpy as np
 from harness import setting
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
-from soaking import batch, loops
+from soaking import batch, loops, rollouts
 from soaking.problems import make
 from soaking.tally import Tally, append
 
 RESULTS = Path(__file__).parent / "results" / "soak.csv"
 BATCH, SECONDS, SCENES = 20_000, 2.0, 10_000  # problems of one job, time and most scenes of the other kind
+KINDS = ("problems", "loops", "rollouts")
 TOLD = 5  # failures of each kind
 ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")  # in each worker
 
@@ -37,35 +39,33 @@ def job(kind: str, seed: int, first: int) -> tuple[str, object, float]:
     started = perf_counter()
     if kind == "problems":
         return kind, batch.run(seed, first, BATCH), perf_counter() - started
-    found, _ = loops.run(seed, first, SECONDS, SCENES)
+    found, _ = (loops if kind == "loops" else rollouts).run(seed, first, SECONDS, SCENES)
     return kind, found, perf_counter() - started
 
 
-def soak(minutes: float, share: float, seed: int, jobs: int) -> Tally:
+def soak(minutes: float, parts: list[float], seed: int, jobs: int) -> Tally:
     """Until the time is over, or somebody interrupts."""
     tally, console = Tally(), Console()
     os.environ.update(ONE_THREAD)
     batch.prepare()
     columns = (TextColumn("{task.description}"), BarColumn(), TimeRemainingColumn())
     pool = ProcessPoolExecutor(jobs, mp_context=multiprocessing.get_context("spawn"))
-    started, turn, pending = perf_counter(), {"problems": 0, "loops": 0}, set()
+    started, turn, pending = perf_counter(), dict.fromkeys(KINDS, 0), set()
+    shares = dict(zip(KINDS, np.array(parts) / sum(parts), strict=True))
     try:
         with Progress(*columns, console=console) as progress:
             bar = progress.add_task("soaking", total=60.0 * minutes)
             while pending or perf_counter() - started < 60.0 * minutes:
                 while len(pending) < 2 * jobs and perf_counter() - started < 60.0 * minutes:
-                    spent = tally.seconds
-                    wanted = share * (spent["problems"] + spent["loops"])
-                    ahead = sum(turn.values()) % 2 == 0 if not spent["loops"] + spent["problems"] else None
-                    problems = share > 0.0 and (spent["problems"] <= wanted if ahead is None else ahead or share == 1.0)
-                    kind = "problems" if problems else "loops"
-                    first = turn[kind] * (BATCH if problems else SCENES)
+                    kind = _behind(shares, tally.seconds, turn)
+                    first = turn[kind] * (BATCH if kind == "problems" else SCENES)
                     turn[kind] += 1
                     pending.add(pool.submit(job, kind, seed, first))
                 done, pending = wait(pending, timeout=1.0, return_when=FIRST_COMPLETED)
                 for future in done:
                     _add(tally, console, *future.result())
-                words = f"{tally.problems:,} problems, {tally.steps:,} steps, {tally.failed} failures"
+                steps = tally.steps + tally.rolled
+                words = f"{tally.problems:,} problems, {steps:,} steps, {tally.failed} failures"
                 progress.update(bar, completed=perf_counter() - started, description=words)
     except KeyboardInterrupt:
         console.print("interrupted: what was done is kept")
@@ -78,10 +78,20 @@ def soak(minutes: float, share: float, seed: int, jobs: int) -> Tally:
     return tally
 
 
+def _behind(shares: dict[str, float], spent: dict[str, float], turn: dict[str, int]) -> str:
+    """The kind whose share of the time is spent least; those that were not yet asked for come first."""
+    return min(
+        (kind for kind in KINDS if shares[kind] > 0.0), key=lambda kind: (turn[kind] > 0, spent[kind] / shares[kind])
+    )
+
+
 def _add(tally: Tally, console: Console, kind: str, found: object, seconds: float) -> None:
     """One result; its failures are told with what shows them again."""
     known, told = len(tally.failures), tally.kinds()
-    (tally.add_batch if kind == "problems" else tally.add_loops)(found, seconds)
+    if kind == "problems":
+        tally.add_batch(found, seconds)
+    else:
+        tally.add_loops(found, seconds, kind)
     for failure in tally.failures[known:]:
         told[failure.kind] += 1
         if told[failure.kind] <= TOLD:
@@ -89,7 +99,7 @@ def _add(tally: Tally, console: Console, kind: str, found: object, seconds: floa
             console.print(f"{what}: python benchmarks/soak.py {failure.command}", soft_wrap=True, markup=False)
 
 
-def again(problem: list[int] | None, scene: list[int] | None) -> int:
+def again(problem: list[int] | None, scene: list[int] | None, rolled: list[int] | None) -> int:
     """One problem or scene once more, with all there is to see."""
     np.set_printoptions(linewidth=120)
     if problem:
@@ -97,7 +107,7 @@ def again(problem: list[int] | None, scene: list[int] | None) -> int:
         for name, value in zip(made_names(), make.inner(*problem)[0], strict=True):
             print(f"{name} = {value!r}")
     else:
-        found, _ = loops.run(scene[0], scene[1], 0.0)
+        found, _ = loops.run(*scene, 0.0) if scene else rollouts.run(*rolled, 0.0)
     print(found)
     return len(found.failures)
 
@@ -113,15 +123,19 @@ def main() -> int:
     """Soak, or show one failure again; 1 if anything failed."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--minutes", type=float, default=10.0)
-    parser.add_argument("--share", type=float, default=0.5, help="of the time that goes to problems")
+    shares = "of the time: problems, closed loops, compiled rollouts"
+    parser.add_argument("--parts", type=float, nargs=3, default=[5.0, 4.0, 1.0], help=shares)
     parser.add_argument("--seed", type=int, default=time_ns() // 1_000_000_000)
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1)
     parser.add_argument("--problem", type=int, nargs=2, metavar=("SEED", "INDEX"))
     parser.add_argument("--scene", type=int, nargs=2, metavar=("SEED", "INDEX"))
+    parser.add_argument("--rollouts", type=int, nargs=2, metavar=("SEED", "INDEX"))
     given = parser.parse_args()
-    if given.problem or given.scene:
-        return min(again(given.problem, given.scene), 1)
-    tally = soak(given.minutes, given.share, given.seed, given.jobs)
+    if given.problem or given.scene or given.rollouts:
+        return min(again(given.problem, given.scene, given.rollouts), 1)
+    if min(given.parts) < 0.0 or not sum(given.parts) > 0.0:
+        parser.error(f"--parts are {given.parts}; expected three numbers, none negative, and not all zero")
+    tally = soak(given.minutes, given.parts, given.seed, given.jobs)
     row = tally.row(given.minutes, given.seed, given.jobs)
     Console().print("\n".join(f"{key.replace('_', ' ')}: {value}" for key, value in row.items()), highlight=False)
     return 1 if tally.failed else 0

@@ -12,6 +12,7 @@ import pinocchio as pin
 import pytest
 
 import cartctl as cc
+from cartctl.compiled.path_table import ROW, path_table, read_table
 from tests.ways import general
 
 STEP = 1e-10  # rad/s and m/s: one step from equal states, compiled and by Pinocchio
@@ -164,6 +165,44 @@ def test_a_corner_that_waits_and_one_that_does_not():
         controller = cc.Controller(robot, [cc.FrameTask(robot.tool, target=path), cc.PostureTask()], solver="sns")
         batch = agrees_step_by_step(controller, np.array(robot.home)[None], 0.6)
         assert batch._own[0, -1, 0] < batch.time[-1], "too fast for the arm, so it waited"
+
+
+def test_a_fast_path_needs_no_more_samples_than_its_shape_does():
+    """Where an acceleration passes zero, differences of rates over short times are round-off: no reason to halve."""
+    T, a = np.eye(3), 0.5
+
+    def path(t):  # 4 Hz
+        w = 8.0 * np.pi
+        c, s, z = np.cos(w * t), np.sin(w * t), np.zeros(3)
+        twist = np.array([-a * w * s, a * w * c, 0.0, *z])
+        return cc.PathSample(
+            np.array([a * c, a * s, 0.3]), T, twist, np.array([-a * w * w * c, -a * w * w * s, 0.0, *z])
+        )
+
+    times = np.linspace(0.0, 0.25, 126)
+    table = path_table(path, times, "task")
+    assert len(table) < 20_000
+    out = np.empty(ROW)
+    for t in np.random.default_rng(0).uniform(0.0, 0.25, 200):
+        read_table(table, t, out)
+        own = path(t)
+        np.testing.assert_allclose(out[10:13], own.position, atol=1e-11)
+        np.testing.assert_allclose(out[13:19], own.twist, atol=1e-10)
+        np.testing.assert_allclose(out[19:25], own.acceleration, atol=1e-7)
+
+
+def test_a_circle_is_worked_out_in_the_loop(monkeypatch):
+    """Its samples are not made ahead; asked as anybody's path, the same comes of it."""
+    controller = panda_job()
+    q0s = starts(controller.robot, 3, seed=5)
+    own = cc.simulate_batch(controller, q0s, 0.3, history=True)
+    monkeypatch.setattr("cartctl.compiled.plan.curve_of", lambda path: None)
+    sampled = cc.simulate_batch(controller, q0s, 0.3, history=True)
+    np.testing.assert_allclose(own.q, sampled.q, atol=1e-9)
+    np.testing.assert_allclose(own.errors[0], sampled.errors[0], atol=1e-9)
+    monkeypatch.undo()
+    monkeypatch.setattr("cartctl.compiled.plan.path_table", None)
+    cc.simulate_batch(controller, q0s, 0.3)
 
 
 def test_bit_for_bit_whatever_the_batch():

@@ -80,6 +80,7 @@ NEARLY_SINGULAR = {
     (30003, 1995324): "feasible at a single point of the rows",
     (30003, 2195699): "what nearly dependent members magnify is no licence to miss a row",
     (50001, 908067): "the same, among rows that are dependent twice over",
+    (90001, 3709332): "a fit that misses by hardly more than round-off presses against bounds",
 }
 
 
@@ -151,6 +152,29 @@ def test_a_few_loops_find_nothing_and_a_push_is_found(soaking):
     assert not found.failures
     pushed, _ = loops.run(seed=3, first=0, seconds=0.0, scenes=1, spoil=1e3)
     assert [f.command for f in pushed.failures] == ["--scene 3 0"]
+
+
+def test_rollouts_find_nothing_and_a_push_is_found(soaking):
+    _, _, tally = soaking
+    from soaking import rollouts
+
+    found, following = rollouts.run(seed=7, first=2, seconds=0.0, scenes=1)
+    assert following == 3 and found.steps == rollouts.STARTS * rollouts.STEPS
+    assert not found.failures and found.certificates > 0
+    pushed, _ = rollouts.run(seed=7, first=2, seconds=0.0, scenes=1, spoil=1e2)
+    assert [f.command for f in pushed.failures] == ["--rollouts 7 2"] and "outside at step" in pushed.failures[0].what
+    total = tally.Tally()
+    total.add_loops(found, 0.5, "rollouts")
+    assert total.row(1.0, 7, 2)["compiled_steps"] == str(found.steps) and total.steps == 0
+
+
+@pytest.mark.parametrize("scene", [(7, 12), (7, 161)], ids=str)
+def test_next_to_rest_a_certificate_asks_for_no_more_than_round_off_leaves(soaking, scene):
+    """u of 1e-9 or 1e-12 where commands of 70 rad/s cancel, or bounds are 1 rad/s."""
+    from soaking import rollouts
+
+    found, _ = rollouts.run(*scene, 0.0)
+    assert not found.failures and found.worst < 1e-6
 
 
 def test_a_line_is_appended(soaking, tmp_path):

@@ -60,21 +60,8 @@ class Loop:
         self.made, self.certificates, self.worst, self.excess, self.size = 0, 0, 0.0, 0.0, 0.0
         self.statuses: Counter[str] = Counter()
         self.exact = scene.controller.solver.name != "task-scaling"  # which may find no scale, and says so
-        lim, robot = scene.limits, scene.controller.robot
-        pairs = [(lim.position_lower, lim.position_upper), (lim.velocity_lower, lim.velocity_upper)]
-        pairs.append((lim.acceleration_lower, lim.acceleration_upper))
-        pairs.append((lim.jerk_lower, lim.jerk_upper))
-        self.low, self.high = np.array([p[0] for p in pairs]), np.array([p[1] for p in pairs])
-        if not scene.jerk:
-            self.low[3], self.high[3] = -np.inf, np.inf
-        width = self.high - self.low
-        self.room = _KEPT * np.where(np.isfinite(width), width, 1.0) + 1e-12
-        # a difference quotient of values that are rounded: what their last digits amount to
-        dt = scene.controller.dt
-        self.room[2] += 1e-15 * self.high[1] / dt
-        self.room[3] += 4e-15 * self.high[1] / dt**2
-        self.room[~np.isfinite(self.room)] = 1.0
-        self.nothing = np.zeros(robot.nv)
+        self.low, self.high, self.room = rooms(scene)
+        self.nothing = np.zeros(scene.controller.robot.nv)
 
     def run(self) -> str:
         """What went wrong, or nothing."""
@@ -122,16 +109,43 @@ class Loop:
         return ""
 
     def _proven(self, solution: cc.Solution) -> str:
-        if solution.outcome is cc.Status.UNPROVEN:  # it says so itself
-            return ""
-        try:
-            certificate = solution.certificate()
-        except UnsupportedProblem:
-            return ""
-        self.certificates += 1
-        if not certificate.worst <= _TOLERANCE:
-            self.size = certificate.worst
-            level = max(certificate.levels, key=lambda c: c.worst)
-            return f"certificate of {level.name} ({level.claim})"
-        self.worst = max(self.worst, certificate.worst)
-        return ""
+        what, size, checked = proven(solution)
+        self.certificates += checked
+        if what:
+            self.size = size
+        else:
+            self.worst = max(self.worst, size)
+        return what
+
+
+def rooms(scene: Scene) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Lower and upper limits of positions, velocities, accelerations and jerks, and by how much each may be left."""
+    lim = scene.limits
+    pairs = [(lim.position_lower, lim.position_upper), (lim.velocity_lower, lim.velocity_upper)]
+    pairs.append((lim.acceleration_lower, lim.acceleration_upper))
+    pairs.append((lim.jerk_lower, lim.jerk_upper))
+    low, high = np.array([p[0] for p in pairs]), np.array([p[1] for p in pairs])
+    if not scene.jerk:
+        low[3], high[3] = -np.inf, np.inf
+    width = high - low
+    room = _KEPT * np.where(np.isfinite(width), width, 1.0) + 1e-12
+    # a difference quotient of values that are rounded: what their last digits amount to
+    dt = scene.controller.dt
+    room[2] += 1e-15 * high[1] / dt
+    room[3] += 4e-15 * high[1] / dt**2
+    room[~np.isfinite(room)] = 1.0
+    return low, high, room
+
+
+def proven(solution: cc.Solution) -> tuple[str, float, int]:
+    """What a solution's certificate leaves open, its worst residual, and whether there was one."""
+    if solution.outcome is cc.Status.UNPROVEN:  # it says so itself
+        return "", 0.0, 0
+    try:
+        certificate = solution.certificate()
+    except UnsupportedProblem:
+        return "", 0.0, 0
+    if certificate.worst <= _TOLERANCE:
+        return "", certificate.worst, 1
+    level = max(certificate.levels, key=lambda c: c.worst)
+    return f"certificate of {level.name} ({level.claim})", certificate.worst, 1

@@ -47,6 +47,20 @@ def scene(seed: int, index: int) -> Scene:
     return Scene(made, q, limits, jerk, told + (", objective" if objective else ""))
 
 
+def rolled_scene(seed: int, index: int) -> Scene:
+    """Scene ``index`` of a seed as a compiled loop can hold it: exact scaling by velocities, no jerk limits."""
+    rng = np.random.default_rng([seed, index, 2])
+    robot = _robot(rng)
+    dt = float(10.0 ** rng.uniform(-4.0, math.log10(2e-2)))
+    limits, _ = _limits(rng, robot)
+    q = start(rng, robot, limits)
+    tasks, what = _tasks(rng, robot, q, dt)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", cc.CartctlWarning)
+        made = cc.Controller(robot, tasks, "sns", limits=limits, dt=dt)
+    return Scene(made, q, limits, False, f"{robot.name}, dt {dt:.2g}, {what}, compiled")
+
+
 def _robot(rng: np.random.Generator) -> cc.Robot:
     name = str(rng.choice(_ROBOTS, p=[0.25, 0.25, 0.15, 0.15, 0.2]))
     return _loaded(name, int(rng.integers(2, 11)) if name == "planar" else 0)

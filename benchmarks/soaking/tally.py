@@ -19,8 +19,8 @@ class Tally:
     """Counts, worst figures of what passed, and the failures."""
 
     def __init__(self) -> None:
-        self.problems = self.steps = self.certificates = self.failed = 0
-        self.seconds = {"problems": 0.0, "loops": 0.0}  # of all processes together
+        self.problems = self.steps = self.rolled = self.certificates = self.failed = 0
+        self.seconds = {"problems": 0.0, "loops": 0.0, "rollouts": 0.0}  # of all processes together
         self.counts, self.worst = np.zeros(AT, dtype=np.int64), np.zeros(3)
         self.loop_worst = self.excess = 0.0
         self.statuses: Counter[str] = Counter()
@@ -34,14 +34,17 @@ class Tally:
         self._fail(batch.failed, batch.failures)
         self.seconds["problems"] += seconds
 
-    def add_loops(self, loops: Loops, seconds: float) -> None:
-        """One more run of closed loops."""
-        self.steps += loops.steps
+    def add_loops(self, loops: Loops, seconds: float, kind: str = "loops") -> None:
+        """One more run of closed loops, or of compiled rollouts."""
+        if kind == "loops":
+            self.steps += loops.steps
+        else:
+            self.rolled += loops.steps
         self.certificates += loops.certificates
         self.loop_worst, self.excess = max(self.loop_worst, loops.worst), max(self.excess, loops.excess)
         self.statuses += loops.statuses
         self._fail(len(loops.failures), loops.failures)
-        self.seconds["loops"] += seconds
+        self.seconds[kind] += seconds
 
     def add_failure(self, failure: Failure) -> None:
         """One that stopped the soak."""
@@ -71,6 +74,8 @@ class Tally:
             "told_unproven": str(self.counts[TOLD]),
             "steps": str(self.steps),
             "steps_per_s": self._rate(self.steps, "loops", jobs),
+            "compiled_steps": str(self.rolled),
+            "compiled_steps_per_s": self._rate(self.rolled, "rollouts", jobs),
             "statuses": " ".join(f"{name} {count}" for name, count in sorted(self.statuses.items())),
             "certificates": str(self.certificates),
             "worst_certificate": f"{self.loop_worst:.1e}",

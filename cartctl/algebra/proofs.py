@@ -28,6 +28,7 @@ _TINY = 1e-290  # numbers below this have too few digits left to be judged by
 _LAST_BITS = 1e-14  # relative: a miss this small is round-off
 _GROUND = 1e-8  # of the largest bound: a u smaller than this is judged as if it were this large
 _COARSE = 1e-4  # of u and u0: steps below this are judged as if they were this large
+_SUGGESTED = 1e-5  # of the size that commands alone suggest: the round-off of those that cancel is relative to it
 _MET = 1e-3  # of the rows of a fitted level: misses below this, too
 
 
@@ -96,7 +97,7 @@ def check_proofs(
         terms = max(terms, added)
         slack, value, slope, total, unsure = _value(own, x, low, high, level, fits, b, k, span)
         if k == p:
-            terms = max(terms, _COARSE * pull, least)
+            terms = max(terms, _COARSE * pull, least, _SUGGESTED * size * (pull / reach if reach > 0.0 else 1.0))
         elif fits[k] != SCALED:
             terms = max(terms, _MET * _weight(x, low, high, span, level, k, size))
         residuals[k, DUAL] = rest / terms if terms > _TINY else 0.0

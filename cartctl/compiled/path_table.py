@@ -2,8 +2,9 @@
 
 Between two samples positions and rotation matrices are the polynomials of degree five that meet value, rate and
 acceleration at both, rates the cubic ones that meet rate and acceleration, accelerations their derivatives. An interval
-is halved until the path itself, asked in between, agrees to 1e-12 (m, rad, per s; 1e-10 of accelerations), or until it
-is 1e-9 s long, as around a corner. At a sample the path's own numbers come back unchanged.
+is halved until the path itself, asked in between, agrees to 1e-12 (m, rad, per s; 1e-10 of accelerations) of the
+vector's size, or to what round-off leaves of a difference of rates over so short a time, or until it is 1e-9 s long, as
+around a corner. At a sample the path's own numbers come back unchanged.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from cartctl.kernels import kernel, lean_part
 
 TIME, POSE, TWIST, ACCELERATION, ROW = 0, 1, 13, 19, 25  # columns; POSE: a rotation row by row, then a position
 _EXACT, _BENT, _SHORTEST, _MOST = 1e-12, 1e-10, 1e-9, 2_000_000
+_ROUNDED = 1e-15  # of rates: what differences of them are not sure of
 _INSIDE = (0.25, 0.5, 0.8)  # of an interval: where the path is asked
 
 
@@ -50,14 +52,19 @@ def _between(path: Callable[[float], Any], a: FloatArray, b: FloatArray, name: s
     if length <= _SHORTEST:
         return True
     nodes, out = np.array([a, b]), np.empty(ROW)
+    rates = np.abs(nodes[:, TWIST:ACCELERATION]).max(axis=0)
     for share in _INSIDE:
         t = float(a[TIME] + share * length)
         read_table(nodes, t, out)
-        gap = np.abs(out - _sample(path, t, name))
-        size = 1.0 + np.abs(out)
-        if (gap[:ACCELERATION] > _EXACT * size[:ACCELERATION]).any():
-            return False
-        if (gap[ACCELERATION:] > _BENT * size[ACCELERATION:]).any():
+        own = _sample(path, t, name)
+        gap = np.abs(out - own)[POSE:]
+        room = np.empty(ROW - POSE)
+        room[: TWIST - POSE] = _EXACT * (1.0 + np.abs(own[POSE:TWIST]))
+        for begin, part in ((TWIST, _EXACT), (ACCELERATION, _BENT)):
+            for k in (begin, begin + 3):
+                room[k - POSE : k + 3 - POSE] = part * (1.0 + np.abs(own[k : k + 3]).max())
+        room[ACCELERATION - POSE :] += _ROUNDED * rates / length
+        if (gap > room).any():
             return False
     return True
 

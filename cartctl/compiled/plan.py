@@ -16,6 +16,7 @@ import numpy as np
 from cartctl.checks import FloatArray, IntArray
 from cartctl.compiled import store_kernel as at
 from cartctl.compiled.answer_kernel import STATUSES
+from cartctl.compiled.curve import curve_of
 from cartctl.compiled.path_table import ROW, path_table, samples
 from cartctl.compiled.rollout_kernel import roll
 from cartctl.compiled.workspace import Workspace
@@ -70,10 +71,9 @@ class Loop:
         tables: list[FloatArray] = []
         for k, task in enumerate(tasks):
             if isinstance(task, FrameTask) and task.path is not None:
-                path, name = task.path, f"task {task.name!r}"
                 store.each[at.OPEN_ROTATION, k] = task.goal(float(times[0])).rotation is None
                 store.each[at.PATH, k] = len(tables)
-                tables.append(path_table(path, times, name) if store.waits[k] else samples(path, times, name))
+                tables.append(_table(task.path, times, store.waits[k], f"task {task.name!r}"))
         store.ints[at.STEPS], store.floats[at.START] = steps, t0
         self.steps, self.sizes = steps, (robot.nq, robot.nv, store.rows, len(tasks))
         self._fixed = (
@@ -86,6 +86,14 @@ class Loop:
     def run(self, q0: FloatArray, v0: FloatArray, arrays: Sequence[FloatArray]) -> None:
         """Roll out q0 (B, nq), v0 (B, nv) into the arrays of an Outcome."""
         roll.compiled(*self._fixed, q0, v0, *arrays)
+
+
+def _table(path: Any, times: FloatArray, waits: bool, name: str) -> FloatArray:
+    """What the loop reads the path from: samples, or one row with the figures of a curve that it works out itself."""
+    figures = curve_of(path)
+    if figures is not None:
+        return figures[None]
+    return path_table(path, times, name) if waits else samples(path, times, name)
 
 
 def prepared() -> Any:

@@ -11,6 +11,7 @@ import numpy as np
 from cartctl.checks import FloatArray, IntArray
 from cartctl.compiled import store_kernel as at
 from cartctl.compiled.answer_kernel import DLS, FAILED, RECOVERING, SNS, made
+from cartctl.compiled.curve_kernel import curve_sample
 from cartctl.compiled.look_kernel import RECOVERING as _RECOVERING
 from cartctl.compiled.motion_kernel import integrate
 from cartctl.compiled.path_table import follow
@@ -82,7 +83,10 @@ def _roll_one(
             table = int(s.each[PATH, i])
             if table >= 0:
                 sample = s.samples[SAMPLE * i : SAMPLE * (i + 1)]
-                cursor[i] = follow(nodes[begin[table] : begin[table + 1]], cursor[i], s.each[OWN, i], sample)
+                if begin[table + 1] - begin[table] == 1:
+                    curve_sample(nodes[begin[table], 1:], s.each[OWN, i], sample)
+                else:
+                    cursor[i] = follow(nodes[begin[table] : begin[table + 1]], cursor[i], s.each[OWN, i], sample)
         ints[LOOKS] = 1 if k == steps else 0
         status = _stepped(s, ints, floats, q, v, t)
         if q_all.shape[0] > 0:
@@ -140,9 +144,10 @@ def roll(
 ) -> None:
     """Roll out every start q0 (B, nq), v0 (B, nv) by a store of its own, copied from the one that is given.
 
-    nodes: the tables of all paths, each from begin[k] on. Fills the ends q_end, v_end and error_end (B, M), the least
-    scale of every task least (B, p), and how often each status was met, counts (B, 10). With room for them, every step,
-    (B (N + 1), ...): q, v, error, and step_all of status, scales (p,) and the tasks' own times (p,).
+    nodes: the tables of all paths, each from begin[k] on; one of a single row is a curve. Fills the ends q_end, v_end
+    and error_end (B, M), the least scale of every task least (B, p), and how often each status was met, counts (B, 10).
+    With room for them, every step, (B (N + 1), ...): q, v, error, and step_all of status, scales (p,) and the tasks'
+    own times (p,).
     """
     own = (ints.copy(), floats.copy(), np.ascontiguousarray(nodes), begin.copy(), np.zeros(ints[TASKS], np.int64))
     now = (np.empty(q0.shape[1]), np.empty(v0.shape[1]))

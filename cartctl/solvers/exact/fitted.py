@@ -46,6 +46,7 @@ _GAIN, _OFTEN = 1e-14, 6  # of the sum: so many steps one after another that low
 _REST = 1e-11  # of the largest miss: a step that changes the rows by less is none
 _ROUND_OFF = 1e-14  # of the rows' size times that of u: rows that move or miss by less do not
 _NOTHING = 1e-12  # of what is added up in a row, or may have been: a miss below this is none
+_FAINT = 1e-9  # of the rows' size times that of u: a fit that misses by less, and by more than nothing, is in doubt
 _SURE = 1e3  # times the round-off in it: a multiplier this large is one
 _MAGNIFIED = 1e9  # times round-off: no multiplier this large is due to it
 _PULLS = 1e-9  # of the rows' size times the largest miss: a multiplier below this is none
@@ -102,6 +103,8 @@ def fitted_level(
         _slope(rows, miss, gradient)
         weakest = _multipliers(w, gradient, size * max(_PULLS * largest, round_off), stays)
         if weakest < 0:
+            if 0.0 < largest <= _FAINT * size * max(float(q.norm[q.state.shape[0]]), largest_entry(u)):
+                w.K[NEARLY, 0] = 1  # what presses against so faint a miss may be its round-off
             write_multipliers(w, q, norm, proof)
             _keep_sure(w, _SURE * size * (round_off + size * unsure(w, u)))
             return MET, lost
