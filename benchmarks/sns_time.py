@@ -1,4 +1,4 @@
-"""What the exact solver costs: the compiled engine on prepared arrays, and `cc.solve` on top.
+"""What the exact solver costs: the compiled engine on prepared arrays, `cc.Prepared` and `cc.solve` around it.
 
     python benchmarks/sns_time.py            # print the table
     python benchmarks/sns_time.py --save     # and write benchmarks/results/sns_time.csv
@@ -18,13 +18,11 @@ import numpy as np
 from harness import interleaved, save_rows, setting, show
 
 import cartctl as cc
-from cartctl.solvers.exact.call import arrays_of
-from cartctl.solvers.exact.lexicographic import lexicographic
+from cartctl.solvers.exact.prepared_kernel import solve_prepared
 
 RESULTS = Path(__file__).parent / "results" / "sns_time.csv"
 INSTANCES, ROUNDS = 12, 8
 FREE, SATURATED, SCALED = "unsaturated", "saturated", "scaled"
-_NO_GUESS, _NO_PROOFS = np.zeros(1, dtype=np.int64), np.zeros((0, 0))
 
 
 def instance(rng: np.random.Generator, n: int, sizes: tuple[int, ...], kind: str) -> cc.Problem | None:
@@ -50,13 +48,16 @@ def instances(n: int, sizes: tuple[int, ...], kind: str) -> list[cc.Problem]:
     return [p for p, _ in zip(filter(None, found), range(INSTANCES), strict=False)]
 
 
-def compiled(problem: cc.Problem, guess: np.ndarray = _NO_GUESS) -> Callable[[], object]:
-    """The engine on prepared arrays."""
-    arrays = arrays_of(problem, False)
-    u, scales = np.empty(problem.n), np.empty(len(problem.equations))
-    rest = (*arrays, guess, u, scales, np.empty(problem.n + 2, dtype=np.int64), _NO_PROOFS)
-    engine = lexicographic.compiled
-    return lambda: engine(*rest)
+def prepared(problem: cc.Problem, warm: bool = False) -> tuple[Callable[[], object], Callable[[], object]]:
+    """The engine on prepared arrays, and :meth:`cartctl.Prepared.solve`; warm: from the instance's own answer."""
+    made = cc.Prepared(problem.n, [len(e.b) for e in problem.equations], bounds=problem.lower is not None)
+    for A, b, e in zip(made.A, made.b, problem.equations, strict=True):
+        A[:], b[:] = e.A, e.b
+    if problem.lower is not None:
+        made.lower[:], made.upper[:] = problem.lower, problem.upper
+    made.solve(warm)
+    engine, arrays = solve_prepared.compiled, (made._ints, made._floats)
+    return lambda: engine(*arrays), lambda: made.solve(warm)
 
 
 def cases() -> Iterator[tuple[str, int, tuple[int, ...], str, bool]]:
@@ -83,32 +84,34 @@ def main() -> None:
     save = parser.parse_args().save
     A = np.random.default_rng(0).normal(size=(6, 7))
     nothing = cc.Problem([(np.zeros((0, 1)), [])])
-    references = {"called for nothing": compiled(nothing), "numpy pinv 6 x 7": lambda: np.linalg.pinv(A)}
+    references = {"called for nothing": prepared(nothing)[0], "numpy pinv 6 x 7": lambda: np.linalg.pinv(A)}
     least = {name: float(min(times)) for name, times in interleaved(references, ROUNDS, 300).items()}
     base = least["numpy pinv 6 x 7"]
-    rows = [row(name, "", "", "", 1, t, None, base) for name, t in least.items()]
+    rows = [row(name, "", "", "", 1, t, [], base) for name, t in least.items()]
     sns = cc.solvers.get_solver("sns")
     for group, n, sizes, kind, warm in cases():
         problems = instances(n, sizes, kind)
         functions: dict[str, Callable[[], object]] = {}
         for k, problem in enumerate(problems):
             start = sns.solve(problem) if warm else None
-            functions[f"engine {k}"] = compiled(problem, _NO_GUESS if start is None else start.warm)
+            functions[f"engine {k}"], functions[f"prepared {k}"] = prepared(problem, warm)
             functions[f"solve {k}"] = lambda p=problem, s=start: sns.solve(p, s)
         times = interleaved(functions, ROUNDS, 2000 // n)
-        engine, solve = (
-            float(np.median([min(times[f"{what} {k}"]) for k in range(len(problems))])) for what in ("engine", "solve")
+        engine, *calls = (
+            float(np.median([min(times[f"{what} {k}"]) for k in range(len(problems))]))
+            for what in ("engine", "prepared", "solve")
         )
-        rows.append(row(group, n, "+".join(map(str, sizes)), kind + " warm" * warm, len(problems), engine, solve, base))
+        rows.append(row(group, n, "+".join(map(str, sizes)), kind + " warm" * warm, len(problems), engine, calls, base))
     show("Exact scaling, us", rows)
     if save:
         save_rows(RESULTS, rows, setting())
 
 
 def row(
-    group: str, n: object, sizes: str, kind: str, count: int, engine: float, solve: float | None, base: float
+    group: str, n: object, sizes: str, kind: str, count: int, engine: float, calls: list[float], base: float
 ) -> dict[str, str]:
     """One line of the table."""
+    told = [f"{t:.2f}" for t in calls] or ["", ""]
     return {
         "case": group,
         "n": str(n),
@@ -116,7 +119,8 @@ def row(
         "kind": kind,
         "instances": str(count),
         "engine_us": f"{engine:.2f}",
-        "solve_us": "" if solve is None else f"{solve:.2f}",
+        "prepared_us": told[0],
+        "solve_us": told[1],
         "of_pinv": f"{engine / base:.2f}",
     }
 

@@ -42,6 +42,7 @@ _HOMES = {
     "cartctl.solvers.hqp": ("HQP",),
     "cartctl.solvers.qp": ("QP",),
     "cartctl.solvers.sns": ("SNS",),
+    "cartctl.solvers.prepared": ("Prepared",),
     "cartctl.solvers.sns_greedy": ("SNSGreedy",),
     "cartctl.solvers.task_scaling": ("TaskScaling",),
     "cartctl.solvers.transpose": ("Transpose",),
@@ -234,6 +235,7 @@ if TYPE_CHECKING:  # editors and mypy see what __getattr__ finds
     from cartctl.solvers.main_variables import MainVariables as MainVariables
     from cartctl.solvers.numerical_filtering import NumericalFilteringSolver as NumericalFilteringSolver
     from cartctl.solvers.pinv import Pinv as Pinv
+    from cartctl.solvers.prepared import Prepared as Prepared
     from cartctl.solvers.projected_gradient import ProjectedGradient as ProjectedGradient
     from cartctl.solvers.qp import QP as QP
     from cartctl.solvers.reduced_gradient import ReducedGradient as ReducedGradient
