@@ -174,11 +174,14 @@ def line(save: bool, seconds: float) -> None:
         save_rows(RESULTS / "obstacles_line.csv", rows, setting())
 
 
+MARGIN, BRAKING = 0.01, 0.25  # m, and m/s^2, which all pairs of both arms can keep to at a time
+
+
 def reach(
     robot: cc.Robot, rng: np.random.Generator, rows: bool, speed: float, dt: float = 5e-3, seconds: float = 2.5
 ) -> tuple[float, float, int]:
     """Both hands to where a random posture of the upper body has them; smallest distance, final error, infeasible."""
-    watch = cc.AvoidSelf(0.01, deceleration=0.5)
+    watch = cc.AvoidSelf(MARGIN, deceleration=BRAKING)
     hands = ("wrist_left_ft_tool_link", "wrist_right_ft_tool_link")
     goal = robot.state(robot.random_configuration(rng))
     tasks: list[cc.Task] = [cc.FrameTask(f, "position", gain=3.0, target=goal.position(f)) for f in hands]
@@ -217,11 +220,11 @@ def talos(save: bool, reaches: int) -> None:
         least = np.array([f[0] for f in found])
         rows.append(
             {
-                "rows": "AvoidSelf(0.01)" if guard else "none",
+                "rows": f"AvoidSelf({MARGIN:g}, deceleration={BRAKING:g})" if guard else "none",
                 "joint_speeds": f"{speed:g} rad/s" if np.isfinite(speed) else "the robot's",
                 "reaches": str(reaches),
                 "with_a_collision": str(int(np.sum(least < 0.0))),
-                "inside_the_margin": str(int(np.sum(least < 0.01 - 1e-5))),
+                "inside_the_margin": str(int(np.sum(least < MARGIN - 1e-5))),
                 "nearest_mm": f"{1e3 * least.min():.2f}",
                 "reached_within_1_cm": str(int(sum(f[1] < 0.01 for f in found))),
                 "infeasible_steps": str(sum(f[2] for f in found)),
