@@ -6,7 +6,7 @@ READY  := $(VENV)/.ready
 JOBS   ?= 2
 MINUTES ?= 10
 
-.PHONY: help demo test lint bench race soak docs notebooks clean
+.PHONY: help demo test lint bench micro race soak docs notebooks clean
 .DEFAULT_GOAL := help
 
 help:  ## what there is
@@ -36,12 +36,17 @@ bench: $(READY)  ## ten methods on nine arms in one table, and the time of one s
 	@$(BIN)/python benchmarks/solver_time.py
 	@$(BIN)/python benchmarks/compiled_time.py
 
+micro: $(READY)  ## kernels and calls by pytest-benchmark: a table a group, numpy's pinv in each; ms are us a call
+	@OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest benchmarks/test_micro.py -q --benchmark-timer=time.process_time \
+	  --benchmark-group-by=group --benchmark-sort=min --benchmark-columns=min,median,iqr,rounds
+
 race: $(READY)  ## cartctl and its peers on the same jobs, each in an environment of its own
-	@for peer in roboticstoolbox pink placo; do \
-	  test -x .race/$$peer/bin/python && continue; \
-	  pins=$$(sed -n 's/^requires: //p' benchmarks/race/*_$$peer.py); \
-	  $(PYTHON) -m venv .race/$$peer && .race/$$peer/bin/python -m pip install --quiet --disable-pip-version-check $$pins \
-	    || { echo "$$peer cannot be installed here and is left out"; rm -rf .race/$$peer; }; \
+	@for script in $$(grep -l '^requires: ' benchmarks/race/*.py); do \
+	  peer=$$(basename $$script .py | cut -d_ -f2); pins=$$(sed -n 's/^requires: //p' $$script); \
+	  test "$$(cat .race/$$peer/pins 2>/dev/null)" = "$$pins" && continue; \
+	  rm -rf .race/$$peer; $(PYTHON) -m venv .race/$$peer \
+	    && .race/$$peer/bin/python -m pip install --quiet --disable-pip-version-check --only-binary :all: $$pins \
+	    && echo "$$pins" > .race/$$peer/pins || { echo "$$peer cannot be installed here and is left out"; rm -rf .race/$$peer; }; \
 	done
 	@$(BIN)/python benchmarks/race/race.py --save
 

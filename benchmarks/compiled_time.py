@@ -37,27 +37,30 @@ def controller(solver: str = "sns", **given: object) -> cc.Controller:
     return cc.Controller(robot, [hand, cc.PostureTask()], solver=solver, **given)
 
 
-def rollout(job: cc.Controller) -> Callable[[], int]:
+def rollout(job: cc.Controller, copies: int = COPIES, steps: int = STEPS) -> Callable[[], int]:
     """One round: how many steps it makes. The table of the path is made once."""
     from cartctl.motion.batch import _compiled, _loop
 
-    loop, home = _loop(job, 0.0, STEPS), job.robot.home
-    starts, rates = np.tile(home, (COPIES, 1)), np.zeros((COPIES, len(home)))
+    loop, home = _loop(job, 0.0, steps), job.robot.home
+    starts, rates = np.tile(home, (copies, 1)), np.zeros((copies, len(home)))
 
     def run() -> int:
         _compiled(loop, starts, rates, False, 1)
-        return COPIES * STEPS
+        return copies * steps
 
     return run
 
 
+def reachable(count: int) -> np.ndarray:
+    """Poses of the tool at random configurations inside the limits, (count, 4, 4)."""
+    robot, rng = cc.load("panda"), np.random.default_rng(1)
+    Q = rng.uniform(robot.limits.position_lower, robot.limits.position_upper, (count, robot.nv))
+    return np.array([robot.state(q).placement(robot.tool).homogeneous for q in Q])
+
+
 def candidates() -> dict[str, Callable[[], int]]:
     """What is measured; every function returns how many steps, poses or calls it made."""
-    robot, rng = cc.load("panda"), np.random.default_rng(1)
-    low, high = robot.limits.position_lower, robot.limits.position_upper
-    poses = np.array(
-        [robot.state(q).placement(robot.tool).homogeneous for q in rng.uniform(low, high, (POSES, robot.nv))]
-    )
+    robot, poses = cc.load("panda"), reachable(POSES)
     data, frame, world = robot.model.createData(), robot.frame_id(robot.tool), pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
     home, at_rest = robot.home, np.zeros(robot.nv)
     slow = robot.limits.replace(velocity_lower=-0.4, velocity_upper=0.4)
