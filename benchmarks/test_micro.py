@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from compiled_time import controller, reachable, rollout
 from pytest_benchmark.fixture import BenchmarkFixture
-from sns_time import FREE, SATURATED, SCALED, cases, compiled, instances
+from sns_time import FREE, SATURATED, SCALED, cases, instances, prepared
 from whole_steps import controllers, motion
 
 import cartctl as cc
@@ -49,7 +49,7 @@ def test_numpy_pinv(benchmark: BenchmarkFixture, group: str) -> None:
 @pytest.mark.benchmark(group=KERNELS)
 @pytest.mark.parametrize(("n", "sizes", "kind"), SIZES, ids=lambda v: "+".join(map(str, v)) if type(v) is tuple else v)
 def test_sns_kernel(benchmark: BenchmarkFixture, n: int, sizes: tuple[int, ...], kind: str) -> None:
-    thousand(benchmark, [compiled(problem) for problem in instances(n, sizes, kind)])
+    thousand(benchmark, [prepared(problem)[0] for problem in instances(n, sizes, kind)])
 
 
 @pytest.mark.benchmark(group=KERNELS)
@@ -57,6 +57,12 @@ def test_dls_kernel(benchmark: BenchmarkFixture) -> None:
     rng = np.random.default_rng(0)
     A, b = rng.normal(size=(6, 7)), rng.normal(size=6)
     thousand(benchmark, [lambda: damped_solve(A, b, 1e-4)])
+
+
+@pytest.mark.benchmark(group=SOLVES)
+@pytest.mark.parametrize("kind", KINDS)
+def test_prepared(benchmark: BenchmarkFixture, kind: str) -> None:
+    thousand(benchmark, [prepared(problem)[1] for problem in instances(7, (6,), kind)])
 
 
 @pytest.mark.benchmark(group=SOLVES)
