@@ -112,11 +112,8 @@ def test_any_planar_arm(name, solver, kind, level, accelerations):
 
 
 OPEN = {  # robot, seed, solver, level, accelerations
-    ("panda", 2, "hqp", "velocity", True),
-    ("panda", 2, "hqp", "acceleration", True),
     ("lwr", 2, "sns", "velocity", True),
     ("lwr", 2, "hqp", "velocity", True),
-    ("lwr", 2, "hqp", "acceleration", True),
 }
 
 
@@ -124,11 +121,37 @@ OPEN = {  # robot, seed, solver, level, accelerations
 @pytest.mark.parametrize("solver", ["sns", "hqp"])
 @pytest.mark.parametrize("seed", range(5))
 @pytest.mark.parametrize("name", ["panda", "lwr", "kinova"])
-def test_any_direction(name, seed, solver, level, accelerations):
+def test_any_direction(name, seed, solver, level, accelerations, request):
     if (name, seed, solver, level, accelerations) in OPEN:
-        pytest.xfail("open: it goes on moving, or not below the threshold by the deadline")
+        late = "open: it rests, but later than the deadline, swinging about the edge"
+        request.node.add_marker(pytest.mark.xfail(strict=True, reason=late))
     robot = arm(name)
     found = rolled(robot, stack(robot, "position", far_away(robot, seed)), solver, level, accelerations)
+    assert_rests(found)
+
+
+@pytest.mark.parametrize(
+    "name, seed, solver, level, accelerations",
+    [
+        ("panda", 8, "hqp", "velocity", False),
+        ("panda", 10, "hqp", "velocity", False),
+        ("panda", 17, "hqp", "velocity", True),
+        ("panda", 6, "hqp", "acceleration", True),
+        ("panda", 9, "sns", "velocity", True),
+        ("lwr", 6, "sns", "velocity", True),
+        ("lwr", 14, "hqp", "velocity", True),
+        ("lwr", 8, "sns", "acceleration", True),
+        ("lwr", 10, "hqp", "acceleration", True),
+        ("kinova", 14, "hqp", "velocity", False),
+    ],
+)
+def test_joints_do_not_take_turns_at_their_limits(name, seed, solver, level, accelerations):
+    """Directions in which they did: left out by the sign of the step, or sent back by the solver."""
+    robot = arm(name)
+    found = rolled(robot, stack(robot, "position", far_away(robot, seed)), solver, level, accelerations)
+    limits = robot.limits
+    at_limit = (found.q[-1] - limits.position_lower < 1e-6) | (limits.position_upper - found.q[-1] < 1e-6)
+    assert at_limit.any()
     assert_rests(found)
 
 

@@ -30,9 +30,10 @@ from cartctl.levels.approach_kernel import (
     TOP_SPEED,
     directions,
     hold,
+    is_beyond,
     matters,
 )
-from cartctl.levels.left_out import stands
+from cartctl.levels.left_out import is_pressed, level_of, stands
 
 _BENT, _BENDS, _CLEAR = 1e-3, 0.5, 1e-2  # as in levels.approach
 _NO_FREEDOM = 1e-9  # as in levels.calming
@@ -58,7 +59,7 @@ class Room(NamedTuple):
     out: FloatArray  # (r,)
     h: FloatArray  # (r,)
     x: FloatArray  # (nv,)
-    y: FloatArray  # (nv,)
+    stood: FloatArray  # (nv,) the way each joint that was left out is wanted, 0 for others
     A: FloatArray  # (r, nv)
     nothing: FloatArray  # (0,)
     none: FloatArray  # (0, nv)
@@ -206,28 +207,37 @@ def _left_out(
     room: Room,
 ) -> bool:
     """Fill room.A with J less the joints that :mod:`cartctl.levels.left_out` leaves out: whether there is any."""
-    (m, n), s, W, wanted, found = J.shape, room.s, room.W, room.x, False
+    (m, n), s, W, wanted, stood, found = J.shape, room.s, room.W, room.x, room.stood, False
     for j in range(n):
         wanted[j] = 0.0
+        stood[j] = 0.0
+    if lower.shape[0] == 0:
+        return False
     for k in range(m):
         total = 0.0
         for i in range(m):
             total += turn[i, k] * b[i]
-        total /= s[k] * s[k] + (_WANTED * size) ** 2
+        damped = total / (s[k] * s[k] + (_WANTED * size) ** 2)
         for j in range(n):
-            wanted[j] += W[k, j] * total
+            wanted[j] += W[k, j] * damped
+            stood[j] += W[k, j] * total
+    flat = level_of(b, size)
     for j in range(n):
-        out = False
-        if lower.shape[0] > 0:
-            out = stands(wanted[j], lower[j], upper[j], joints[_STILL, j], moving)
-        if out and not found:
+        still, by = joints[_STILL, j], wanted[j]
+        if not moving:
+            by = stood[j] if abs(stood[j]) > flat else 0.0
+        stood[j] = 0.0
+        if not stands(by, lower[j], upper[j], still, False):
+            continue
+        if is_pressed(wanted[j], still):
+            stood[j] = 1.0 if by > 0.0 else -1.0
+        if not found:
             found = True
             for i in range(m):
                 for k in range(n):
                     room.A[i, k] = J[i, k]
-        if out:
-            for i in range(m):
-                room.A[i, j] = 0.0
+        for i in range(m):
+            room.A[i, j] = 0.0
     return found
 
 
@@ -292,6 +302,7 @@ def approached(
 
     bent (nv + 1,): the motion inwards when the arm was last clear, and 1 once it is known. turn, other (r, r): the
     left singular vectors of the step before, of J and of what was left of it without joints at their bounds.
+    room.stood (nv,): which way joints are pressed against bounds that they are to be kept at, 0 for others.
     """
     m, n = J.shape
     k = min(m, n)
@@ -316,6 +327,9 @@ def approached(
         for i in range(k):
             D[FORWARD, i] *= pace
     edge = hold(b, U[:m, :k], D[:, :k], dt, size, True, out[:m])
+    if moving or not is_beyond(edge, D, k, size):
+        for j in range(n):
+            room.stood[j] = 0.0
     if k > 0 and D[BEND, k - 1] != 0.0:
         _bend_as_before(U, Vt, D, k - 1, m, size, dt, out, bent)
     for a in range(m):
@@ -347,7 +361,7 @@ def _exactly(
     m, n = J.shape
     U, Vt, D, nothing = np.empty((m, k)), np.empty((k, n)), np.empty((ROWS, k)), room.nothing
     walls = (lower, upper, room.none, nothing, nothing)
-    directions(J, b, nothing, rate, error, joints, *walls, dt, size, lower.shape[0] > 0, U, Vt, D)
+    directions(J, b, nothing, rate, error, joints, *walls, dt, size, lower.shape[0] > 0, U, Vt, D, room.stood)
     for i in range(k):
         for a in range(m):
             room.U[a, i] = U[a, i]

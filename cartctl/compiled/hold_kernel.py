@@ -16,6 +16,7 @@ from cartctl.compiled.store_kernel import (
     straightened,
 )
 from cartctl.kernels import lean_part
+from cartctl.levels.left_out import keep
 
 NV, TASKS, LARGEST, COUNT, BOUNDED = at.NV, at.TASKS, at.LARGEST, at.COUNT, at.BOUNDED
 A, JOINTS, LOWER, UPPER, UNIT, ERROR, RATE, BEND, B = (
@@ -81,6 +82,8 @@ def hold_back(s: Store) -> None:
                 chain, s.twelve[n : 2 * n], _task(s, p, first, last), J, b, *asked, s.each[PATH, p] >= 0.0,
                 joints, lower, upper, s.head[DT], _size(J), *memory, room,
             )  # fmt: skip
+            if above == 0 and bounded > 0:
+                keep(room.stood, lower, upper)
         if calm < inf:
             # of a posture below one task, what is left to it is no more than ||b|| + ||J# b||: calming it would
             # take from it what it cannot have anyway, which is done where somebody asks for its rows

@@ -17,7 +17,9 @@ task's Jacobian, ``J v_i = sigma_i u_i``, with the curvature ``h_i = J_dot(v_i) 
 What ranks below a task at the edge moves no faster than the last of these, for in the null space, too, the task curves
 (:mod:`cartctl.levels.calming`); it stands where the edge was reached. On the way back from the edge, an arm bends the
 way it was bent before. Joints that a limit, and directions that a row of a constraint keeps from doing their part are
-left out of J. Far from edge and target, nothing is changed.
+left out of J (:mod:`cartctl.levels.left_out`); before a target at rest and out of reach, and where no constraint has
+rows, joints that the highest task presses against their bounds are kept there: the solver's box is made so narrow. Far
+from edge and target, nothing is changed.
 """
 
 from __future__ import annotations
@@ -30,8 +32,9 @@ import numpy as np
 
 from cartctl.algebra.svd import scale
 from cartctl.checks import FloatArray
-from cartctl.levels.approach_kernel import ASKED, BEND, FORWARD, ROWS, SIGMA, SLOWING, bend, directions, hold
+from cartctl.levels.approach_kernel import ASKED, BEND, FORWARD, ROWS, SIGMA, SLOWING, bend, directions, hold, is_beyond
 from cartctl.levels.calming import Above
+from cartctl.levels.left_out import keep
 from cartctl.model.limits import Limits
 from cartctl.model.state import State
 from cartctl.solvers import Solver
@@ -74,6 +77,7 @@ class Directions(NamedTuple):
     Vt: FloatArray
     D: FloatArray
     size: float
+    stood: FloatArray  # (nv,) the way each joint that was left out is wanted, 0 for others
 
 
 class Approach:
@@ -99,6 +103,7 @@ class Approach:
         self._bent: dict[int, FloatArray] = {}  # by task: the motion inwards, when it was last clear
         self._above = Above(ranked=not solver.stacks)
         self._walls = Walls(_NOTHING, _NOTHING, np.zeros((0, 0)), _NOTHING, _NOTHING)
+        self._box: tuple[FloatArray, FloatArray] | None = None  # the solver's, on u
 
     def prepare(self) -> None:
         """Compile ahead what the first step would otherwise wait for."""
@@ -116,8 +121,12 @@ class Approach:
         upper: FloatArray | None,
         rows: tuple[FloatArray, FloatArray, FloatArray] | None,
     ) -> None:
-        """Begin a step at ``state`` under a box and rows on u; the tasks follow, highest priority first."""
+        """Begin a step at ``state`` under a box and rows on u; the tasks follow, highest priority first.
+
+        The box is narrowed where a task wants joints kept at their bounds.
+        """
         self._above.clear()
+        self._box = None if lower is None or upper is None or rows is not None else (lower, upper)
         C, c_lower, c_upper = (np.zeros((0, state.v.shape[0])), _NOTHING, _NOTHING) if rows is None else rows
         low, high = (_NOTHING, _NOTHING) if lower is None or upper is None else (lower, upper)
         self._walls = Walls(low, high, C, c_lower, c_upper)
@@ -133,7 +142,7 @@ class Approach:
 
     def _held(self, task: Task, state: State, J: FloatArray, reference: Reference, b: FloatArray) -> Approached:
         found = self._along(task, state, J, reference, b, _NOTHING)
-        U, Vt, D, size = found
+        U, Vt, D, size, _ = found
         out, pace = np.empty(J.shape[0]), 1.0
         if id(task) in self._waiting and reference.rate is not None and reference.acceleration is not None:
             pace = self._pace(task, state, found, reference)
@@ -142,7 +151,15 @@ class Approach:
         edge = hold.compiled(b, U, D, self._dt, size, self._scales, out)
         if D.shape[1] and D[BEND, -1] != 0.0:
             self._bend_as_before(task, U[:, -1], Vt[-1], D[:, -1], size, out)
+        self._keep(reference, found, edge)
         return Approached(out, edge, pace)
+
+    def _keep(self, reference: Reference, found: Directions, edge: float) -> None:
+        """Keep joints at the bounds that the highest task presses them against for a resting target out of reach."""
+        if self._box is None or reference.rate is not None or not self._above.is_empty:
+            return
+        if is_beyond(edge, found.D, found.D.shape[1], found.size):
+            keep(found.stood, *self._box)
 
     def _along(
         self, task: Task, state: State, J: FloatArray, reference: Reference, b: FloatArray, y: FloatArray
@@ -150,13 +167,13 @@ class Approach:
         """The singular directions, their curvatures where these matter."""
         (m, n), size = J.shape, scale(J)
         k = min(m, n)
-        U, Vt, D = np.empty((m, k)), np.empty((k, n)), np.empty((ROWS, k))
+        U, Vt, D, stood = np.empty((m, k)), np.empty((k, n)), np.empty((ROWS, k)), np.empty(n)
         rate, error = _NOTHING if reference.rate is None else reference.rate, reference.error
         walls = self._walls if reference.rate is None else self._walls.box()  # before a wall one stops, or slides on
         bounded = walls.lower.shape[0] > 0
-        directions.compiled(J, b, y, rate, error, self._joints, *walls, self._dt, size, bounded, U, Vt, D)
+        directions.compiled(J, b, y, rate, error, self._joints, *walls, self._dt, size, bounded, U, Vt, D, stood)
         self._curvatures(task, state, U, Vt, D, error)
-        return Directions(U, Vt, D, size)
+        return Directions(U, Vt, D, size, stood)
 
     def _curvatures(
         self, task: Task, state: State, U: FloatArray, Vt: FloatArray, D: FloatArray, error: FloatArray

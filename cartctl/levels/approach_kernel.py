@@ -6,7 +6,7 @@ import numpy as np
 
 from cartctl.braking import clamp, fastest
 from cartctl.checks import FloatArray, IntArray
-from cartctl.kernels import kernel, part
+from cartctl.kernels import kernel, lean_part, part
 from cartctl.levels.left_out import leave_out
 
 # Rows of the joints' array.
@@ -27,7 +27,7 @@ _STIFF = 0.25  # of sigma^2: a target this far beyond the edge would make a crit
 
 @kernel(
     "void(matrix, vector, vector, vector, vector, matrix, vector, vector, matrix, vector, vector, float, float, bool, "
-    "out_matrix, out_matrix, out_matrix)"
+    "out_matrix, out_matrix, out_matrix, out_vector)"
 )
 def directions(
     J: FloatArray,
@@ -47,11 +47,13 @@ def directions(
     U: FloatArray,
     Vt: FloatArray,
     D: FloatArray,
+    stood: FloatArray,
 ) -> None:
     """Fill U (m, k), Vt (k, n) and D (10, k): what each singular direction of J is asked and has to do it with.
 
     D[ASKED] says whether the direction's curvature matters. y, the next velocity where that is another than b, and
-    rate may be empty. Joints and rows of C whose bounds keep them from doing their part are left out of J.
+    rate may be empty. Joints and rows of C whose bounds keep them from doing their part are left out of J. stood (n,):
+    the way each joint that was left out is wanted, 0 for others.
     """
     m, n = J.shape
     A = np.empty((m, n))
@@ -59,8 +61,11 @@ def directions(
         for j in range(n):
             A[i, j] = J[i, j]
     left, s, right = np.linalg.svd(A, full_matrices=False)
-    if bounded and leave_out(A, left, s, right, b, joints, lower, upper, C, c_lower, c_upper, size, rate.shape[0] > 0):
-        left, s, right = np.linalg.svd(A, full_matrices=False)
+    stood[:] = 0.0
+    if bounded:
+        walls = (lower, upper, C, c_lower, c_upper)
+        if leave_out(A, left, s, right, b, joints, *walls, size, rate.shape[0] > 0, stood):
+            left, s, right = np.linalg.svd(A, full_matrices=False)
     far = 0.0
     for i in range(m):
         far += error[i] * error[i]
@@ -167,6 +172,12 @@ def steer(
         held = held or allowed[k] != asked[k]
     _put_together(y, U, asked, allowed, held, out)
     return calm
+
+
+@lean_part
+def is_beyond(edge: float, D: FloatArray, k: int, size: float) -> bool:
+    """Whether a task is near the edge, or a direction of the k it has is none: joints at their bounds were in it."""
+    return edge < np.inf or (k > 0 and D[SIGMA, k - 1] <= _NOTHING * size)
 
 
 @part

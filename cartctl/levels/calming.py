@@ -32,6 +32,11 @@ class Above:
         self._asked: list[FloatArray] = []
         self.calm = math.inf
 
+    @property
+    def is_empty(self) -> bool:
+        """Whether nothing has been asked for yet."""
+        return not any(J.shape[0] for J in self._rows)
+
     def add(self, J: FloatArray, b: FloatArray, calm: float) -> None:
         """One more task, which leaves ``calm``."""
         self._rows.append(J)

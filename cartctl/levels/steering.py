@@ -75,6 +75,8 @@ class Steering(Approach):
         low = None if lower is None else v + dt * lower
         high = None if upper is None else v + dt * upper
         super().begin(at, low, high, rows)
+        if self._box is not None and lower is not None and upper is not None:
+            self._box = (lower, upper)
 
     def steered(self, task: Task, t: float, anchor: Any, given: Steered) -> Steered:
         """What a task asks for at time t: ``given`` (of the state itself), or velocities held back at p."""
@@ -93,9 +95,11 @@ class Steering(Approach):
         wanted = (0.5 * task.gain) * reference.error
         if reference.rate is not None:
             wanted = wanted + reference.rate
-        U, _, D, size = self._along(task, self._at, J, reference, wanted, y)
+        found = self._along(task, self._at, J, reference, wanted, y)
+        U, _, D, size, _ = found
         out = np.empty(y.shape)
         edge = self._steer(y, np.atleast_1d(task.gain), U, D, self._dt, size, self._scales, out)
+        self._keep(reference, found, edge)
         return out, edge
 
     def damping(self, tasks: Sequence[Task]) -> float:

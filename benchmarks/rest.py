@@ -1,0 +1,60 @@
+"""How many robots come to rest before a target out of reach: random directions from home, by solver and level.
+
+    python benchmarks/rest.py               # print the table
+    python benchmarks/rest.py --save        # and write results/rest.csv
+
+The runs are those of ``tests/test_coming_to_rest.py`` with more directions: 8 s at 10 ms towards a position 1.8 to
+4.5 m away, gain 20/s. At rest: below 1e-3 of every speed limit from the deadline on, and no reversal above 1e-6 of it;
+the deadline is 3 s after the earliest time at which the limits let the joints arrive. Later: at rest within the 8 s,
+but after the deadline, for a long way round or a swing about the edge. Moving: not at rest in the last half second.
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import numpy as np
+from harness import one_table
+
+sys.path.insert(0, str(Path(__file__).parent.parent))
+from tests import test_coming_to_rest as rest
+
+RESULTS = Path(__file__).parent / "results" / "rest.csv"
+DIRECTIONS = 20
+ROBOTS = ("panda", "lwr", "kinova")
+
+
+def verdict(found: rest.Rolled) -> str:
+    """``at_rest``, ``later`` or ``moving``; AssertionError where a limit is broken."""
+    assert found.excess <= 1e-9
+    try:
+        rest.assert_rests(found)
+        return "at_rest"
+    except AssertionError:
+        return "moving" if np.abs(found.shares[-50:]).max() > rest.STANDS else "later"
+
+
+def row(name: str, solver: str, level: str, accelerations: bool) -> dict[str, str]:
+    """One line of the table."""
+    robot, counts = rest.arm(name), {"at_rest": 0, "later": 0, "moving": 0}
+    for seed in range(DIRECTIONS):
+        tasks = rest.stack(robot, "position", rest.far_away(robot, seed))
+        counts[verdict(rest.rolled(robot, tasks, solver, level, accelerations))] += 1
+    limits = "velocity, acceleration" if accelerations else "velocity"
+    return {"robot": name, "solver": solver, "level": level, "limits": limits, "directions": str(DIRECTIONS)} | {
+        kind: str(count) for kind, count in counts.items()
+    }
+
+
+def measured() -> list[dict[str, str]]:
+    """The table, and its sums."""
+    kinds = [(name, solver, *form) for name in ROBOTS for solver in ("sns", "hqp") for form in rest.FORMS]
+    rows = [row(*kind) for kind in kinds]
+    counted = ("directions", "at_rest", "later", "moving")
+    sums = {kind: str(sum(int(r[kind]) for r in rows)) for kind in counted}
+    return [*rows, {"robot": "all", "solver": "", "level": "", "limits": ""} | sums]
+
+
+if __name__ == "__main__":
+    one_table(__doc__, RESULTS, "At rest before a target out of reach", measured)
