@@ -47,6 +47,7 @@ def soak(minutes: float, parts: list[float], seed: int, jobs: int) -> Tally:
     """Until the time is over, or somebody interrupts."""
     tally, console = Tally(), Console()
     os.environ.update(ONE_THREAD)
+    console.print("compiling, or fetching from the cache: minutes, the first time")
     batch.prepare()
     columns = (TextColumn("{task.description}"), BarColumn(), TimeRemainingColumn())
     pool = ProcessPoolExecutor(jobs, mp_context=multiprocessing.get_context("spawn"))
@@ -122,19 +123,27 @@ def made_names() -> tuple[str, ...]:
 def main() -> int:
     """Soak, or show one failure again; 1 if anything failed."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--minutes", type=float, default=10.0)
+    parser.add_argument("--minutes", type=float, default=10.0, help="how long; Ctrl-C keeps what was done")
     shares = "of the time: problems, closed loops, compiled rollouts"
     parser.add_argument("--parts", type=float, nargs=3, default=[5.0, 4.0, 1.0], help=shares)
-    parser.add_argument("--seed", type=int, default=time_ns() // 1_000_000_000)
-    parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1)
-    parser.add_argument("--problem", type=int, nargs=2, metavar=("SEED", "INDEX"))
-    parser.add_argument("--scene", type=int, nargs=2, metavar=("SEED", "INDEX"))
-    parser.add_argument("--rollouts", type=int, nargs=2, metavar=("SEED", "INDEX"))
+    parser.add_argument("--seed", type=int, default=time_ns() // 1_000_000_000, help="of all that is random; the time")
+    parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1, help="processes; one a core")
+    parser.add_argument("--problem", type=int, nargs=2, metavar=("SEED", "INDEX"), help="one problem again")
+    parser.add_argument("--scene", type=int, nargs=2, metavar=("SEED", "INDEX"), help="one closed loop again")
+    parser.add_argument("--rollouts", type=int, nargs=2, metavar=("SEED", "INDEX"), help="one controller's again")
     given = parser.parse_args()
-    if given.problem or given.scene or given.rollouts:
-        return min(again(given.problem, given.scene, given.rollouts), 1)
-    if min(given.parts) < 0.0 or not sum(given.parts) > 0.0:
+    again_of = (given.problem, given.scene, given.rollouts)
+    for name, value in zip(("--problem", "--scene", "--rollouts", "--seed"), (*again_of, [given.seed]), strict=True):
+        if value and min(value) < 0:
+            parser.error(f"{name} is {value}; expected numbers of at least 0")
+    if any(again_of):
+        return min(again(*again_of), 1)
+    if not (min(given.parts) >= 0.0 and 0.0 < sum(given.parts) < np.inf):
         parser.error(f"--parts are {given.parts}; expected three numbers, none negative, and not all zero")
+    if not 0.0 < given.minutes < np.inf or given.jobs < 1:
+        parser.error(
+            f"--minutes is {given.minutes:g} and --jobs {given.jobs}; expected more than 0 minutes and a job or more"
+        )
     tally = soak(given.minutes, given.parts, given.seed, given.jobs)
     row = tally.row(given.minutes, given.seed, given.jobs)
     Console().print("\n".join(f"{key.replace('_', ' ')}: {value}" for key, value in row.items()), highlight=False)

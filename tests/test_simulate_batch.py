@@ -191,6 +191,23 @@ def test_a_fast_path_needs_no_more_samples_than_its_shape_does():
         np.testing.assert_allclose(out[19:25], own.acceleration, atol=1e-7)
 
 
+def test_a_path_whose_twist_is_not_its_velocity_says_so_at_once():
+    """No density would make a table of it; it is stepped in Python."""
+    robot = cc.load("panda")
+    start = robot.state(robot.home).placement(robot.tool)
+    asked = []
+
+    def path(t):
+        asked.append(t)
+        position = start.translation + [0.0, 0.05 * np.sin(3.0 * t), 0.0]
+        return cc.PathSample(position, start.rotation, np.zeros(6), np.zeros(6))
+
+    controller = cc.Controller(robot, [cc.FrameTask(robot.tool, target=path)], solver="sns", dt=1e-3)
+    with pytest.warns(cc.CartctlWarning, match="too rough at t = .* derivatives of its position"):
+        batch = cc.simulate_batch(controller, np.array(robot.home)[None], 0.02)
+    assert batch.reason is not None and len(asked) < 30_000
+
+
 def test_a_circle_is_worked_out_in_the_loop(monkeypatch):
     """Its samples are not made ahead; asked as anybody's path, the same comes of it."""
     controller = panda_job()

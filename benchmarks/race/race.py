@@ -54,9 +54,11 @@ def gauge() -> float:
 def main() -> None:
     """Start the peers, run the rounds, check, print and save."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--peers", type=Path, default=HERE.parent.parent / ".race")
-    parser.add_argument("--rounds", type=int, default=7)
-    parser.add_argument("--poses", type=int, default=10_000)
+    parser.add_argument(
+        "--peers", type=Path, default=HERE.parent.parent / ".race", help="their environments: make race"
+    )
+    parser.add_argument("--rounds", type=int, default=7, help="of each, in turns")
+    parser.add_argument("--poses", type=int, default=10_000, help="of the inverse kinematics")
     parser.add_argument("--save", action="store_true", help=f"write {RESULTS.name} and the README's paragraph")
     asked = parser.parse_args()
     rows = []

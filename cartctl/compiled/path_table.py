@@ -19,7 +19,8 @@ from cartctl.errors import UnsupportedProblem
 from cartctl.kernels import kernel, lean_part
 
 TIME, POSE, TWIST, ACCELERATION, ROW = 0, 1, 13, 19, 25  # columns; POSE: a rotation row by row, then a position
-_EXACT, _BENT, _SHORTEST, _MOST = 1e-12, 1e-10, 1e-9, 2_000_000
+_EXACT, _BENT, _SHORTEST = 1e-12, 1e-10, 1e-9
+_MOST, _MOST_A_STEP = 500_000, 5_000  # samples
 _ROUNDED = 1e-15  # of rates: what differences of them are not sure of
 _INSIDE = (0.25, 0.5, 0.8)  # of an interval: where the path is asked
 
@@ -34,15 +35,18 @@ def path_table(path: Callable[[float], Any], times: FloatArray, name: str) -> Fl
     rows = [_sample(path, t, name) for t in times.tolist()]
     done = [rows[0]]
     for last in rows[1:]:
-        waiting = [last]
+        waiting, begun = [last], len(done)
         while waiting:
             if _between(path, done[-1], waiting[-1], name):
                 done.append(waiting.pop())
             else:
                 middle = 0.5 * (done[-1][TIME] + waiting[-1][TIME])
                 waiting.append(_sample(path, middle, name))
-            if len(done) + len(waiting) > _MOST:
-                raise UnsupportedProblem(f"{name}: its path is too rough for a table of {_MOST} samples")
+            if len(done) + len(waiting) - begun > _MOST_A_STEP or len(done) > _MOST:
+                raise UnsupportedProblem(
+                    f"{name}: its path is too rough at t = {done[-1][TIME]:g} s to be sampled ahead: are its twist and "
+                    "acceleration the derivatives of its position? With path_clock=False one sample a step will do"
+                )
     return np.array(done)
 
 

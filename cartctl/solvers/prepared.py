@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from typing import Any, NoReturn
 
 import numpy as np
 
 from cartctl import checks
 from cartctl.algebra.problem import FITS, Equation, Problem
 from cartctl.algebra.solution import Status
-from cartctl.checks import FloatArray
-from cartctl.errors import NonFiniteError, ParameterError, ProblemError
+from cartctl.checks import FloatArray, IntArray
+from cartctl.errors import ParameterError
 from cartctl.solvers.exact import prepared_kernel as at
 from cartctl.solvers.exact.kinds import CONTRADICTORY, EXTREME, LOST_RANK, STUCK, UNPROVEN
 from cartctl.solvers.sns import SNS
@@ -31,6 +32,8 @@ def _status(flags: int) -> Status | None:
 
 
 _STATUS = tuple(_status(flags) for flags in range(2 * at.MISSING))
+_OPTIONS = {"lower": "bounds=True", "upper": "bounds=True", "drift": "drift=True", "reference": "reference=True"}
+_OPTIONS |= dict.fromkeys(("C", "c_lower", "c_upper"), "constraints=how many rows")
 
 
 class Prepared:
@@ -43,7 +46,7 @@ class Prepared:
     Fill these in place, they are views of one store: A, b, drift (tuples of (m_k, n), (m_k,), (m_k,)), lower, upper,
     reference (n,), C (r, n), c_lower, c_upper (r,), and sizes (p,), the norm that each A has by nature (see
     :class:`cartctl.Equation`). :meth:`solve` fills u (n,) and scales (p,), nan where a level was skipped. All are zeros
-    at first, bounds infinite. Raises ParameterError, ShapeError.
+    at first, bounds infinite. A copy has a store of its own. Raises ParameterError.
 
     >>> import cartctl as cc
     >>> fast = cc.Prepared(3, [1])
@@ -52,6 +55,23 @@ class Prepared:
     >>> fast.solve().name, fast.u.tolist(), fast.scales.tolist()
     ('SCALED', [1.0, 1.0, 0.0], [0.5])
     """
+
+    A: tuple[FloatArray, ...]
+    b: tuple[FloatArray, ...]
+    drift: tuple[FloatArray, ...]
+    C: FloatArray
+    c_lower: FloatArray
+    c_upper: FloatArray
+    lower: FloatArray
+    upper: FloatArray
+    reference: FloatArray
+    sizes: FloatArray
+    u: FloatArray
+    scales: FloatArray
+    _shape: dict[str, Any]
+    _ints: IntArray
+    _floats: FloatArray
+    _call: Callable[[IntArray, FloatArray], int]
 
     def __init__(
         self,
@@ -65,75 +85,93 @@ class Prepared:
         reference: bool = False,
     ) -> None:
         n, r = checks.whole("n", n, 1), checks.whole("constraints", constraints, 0)
-        sizes = [checks.whole(f"rows[{k}]", m, 0) for k, m in enumerate(rows)]
-        fits = ["scale"] * len(sizes) if fits is None else [checks.choice("fits", fit, FITS) for fit in fits]
-        if not sizes or len(fits) != len(sizes):
-            raise ParameterError(f"rows are {list(rows)} and fits {list(fits)}; expected one of each a level")
-        M, p, k = sum(sizes), len(sizes), n if bounds else 0
-        head = [n, M, p, r, int(bool(bounds)), int(bool(drift)), int(bool(reference)), 0]
-        self._ints = np.array([*head, *sizes, *(FITS.index(fit) for fit in fits), *[0] * (n + 3)], dtype=np.int64)
+        sizes = [checks.whole(f"rows[{k}]", m, 0) for k, m in enumerate(checks.listed("rows", rows))]
+        given = ["scale"] * len(sizes) if fits is None else checks.listed("fits", fits)
+        kinds = [checks.choice(f"fits[{k}]", fit, FITS) for k, fit in enumerate(given)]
+        if not sizes or len(kinds) != len(sizes):
+            raise ParameterError(f"rows are {sizes} and fits {kinds}; expected one of each a level, at least one")
+        for name, value in (("bounds", bounds), ("drift", drift), ("reference", reference)):
+            if not isinstance(value, bool):
+                raise ParameterError(f"{name} is {value!r}; expected True or False, the numbers are filled in later")
+        M, p, k, cuts = sum(sizes), len(sizes), n * bounds, np.cumsum(sizes)[:-1]
         lengths = {
-            "A": M * n, "C": r * n, "b": M, "drift": M * bool(drift), "reference": n * bool(reference), "sizes": p,
+            "A": M * n, "C": r * n, "b": M, "drift": M * drift, "reference": n * reference, "sizes": p,
             "c_lower": r, "c_upper": r, "lower": k, "upper": k, "u": n, "scales": p,
         }  # fmt: skip
         edges = np.cumsum([0, *lengths.values()]).tolist()
-        self._floats = np.zeros(edges[-1])
-        part = {name: self._floats[i:j] for name, i, j in zip(lengths, edges[:-1], edges[1:], strict=True)}
-        self._begins = dict(zip(lengths, edges, strict=False))
-        cuts = np.cumsum(sizes)[:-1]
-        self.A: tuple[FloatArray, ...] = tuple(np.split(part["A"].reshape(M, n), cuts))
-        self.b: tuple[FloatArray, ...] = tuple(np.split(part["b"], cuts))
-        self.drift: tuple[FloatArray, ...] = tuple(np.split(part["drift"], cuts)) if drift else ()
-        self.C, self.reference, self.sizes = part["C"].reshape(r, n), part["reference"], part["sizes"]
-        self.c_lower, self.c_upper, self.lower, self.upper = (
-            part[name] for name in ("c_lower", "c_upper", "lower", "upper")
-        )
-        self.u, self.scales = part["u"], part["scales"]
-        for low, high in ((self.lower, self.upper), (self.c_lower, self.c_upper)):
-            low[:], high[:] = -np.inf, np.inf
-        self._fits, self._call = fits, at.solve_prepared.compiled
+        floats = np.zeros(edges[-1])
+        part: dict[str, Any] = {
+            name: floats[i:j]
+            for name, i, j in zip(lengths, edges[:-1], edges[1:], strict=True)
+            if j > i or name not in _OPTIONS
+        }
+        part["A"] = tuple(np.split(part["A"].reshape(M, n), cuts))
+        part |= {name: tuple(np.split(part[name], cuts)) for name in ("b", "drift") if name in part}
+        if r:
+            part["C"] = part["C"].reshape(r, n)
+        for name in sorted(part.keys() & {"lower", "c_lower"}):
+            part[name][:], part[name.replace("lower", "upper")][:] = -np.inf, np.inf
+        head = [n, M, p, r, int(bounds), int(drift), int(reference), 0]
+        ints = np.array([*head, *sizes, *(FITS.index(fit) for fit in kinds), *[0] * (n + 3)], dtype=np.int64)
+        shape = {"n": n, "rows": sizes, "fits": kinds}
+        shape |= {"bounds": bounds, "constraints": r, "drift": drift, "reference": reference}
+        self.__dict__.update(part, _shape=shape, _ints=ints, _floats=floats, _call=at.solve_prepared.compiled)
 
     def solve(self, warm: bool = True) -> Status:
-        """The exact optimum, as ``cc.solve(problem, "sns")`` finds it; how it went.
+        """The exact optimum, as ``cc.solve(problem, "sns")`` finds it, and how it went.
 
-        warm: start from the active bounds of the last answer. What the engine leaves to the general way, rows that the
-        bounds forbid and entries 1e120 apart, is solved there. Raises NonFiniteError, ProblemError, naming the array.
+        warm: start from the active bounds of the last answer. Residuals are not asked for, so INEXACT is none of the
+        statuses but where the general way is gone: for rows that the bounds forbid, and numbers too far apart. FAILED
+        leaves the u inside the bounds that is nearest to zero, and scales of 1. Raises NonFiniteError, ProblemError,
+        ParameterError as a Problem does: u and scales are then as before.
         """
-        self._ints[at.WARM] = warm
-        flags = self._call(self._ints, self._floats)
-        if flags < 0:
-            self._refuse(-1 - flags)
-        return _STATUS[flags] or self._by_problem()
+        self._ints[at.WARM] = bool(warm)
+        try:
+            flags = self._call(self._ints, self._floats)
+        except (ValueError, ArithmeticError):  # a singular value decomposition met infinities
+            flags = EXTREME
+        return (None if flags < 0 else _STATUS[flags]) or self._by_problem()
 
     def _by_problem(self) -> Status:
         found = SNS().solve(self.problem())
         self.u[:], self.scales[:] = found.u, found.scales
-        self._ints[at.HEAD + 2 * len(self.A)] = 0
+        self._ints[at.HEAD + 2 * len(self.A)] = 0  # nobody is active
         return found.status
 
     def problem(self) -> Problem:
         """What the arrays hold now, copied: to be solved by any solver, or certified.
 
-        Raises NonFiniteError, ProblemError.
+        Raises NonFiniteError, ProblemError, ParameterError.
         """
-        drifts = self.drift or (None,) * len(self.A)
+        has, fits = self.__dict__, self._shape["fits"]
+        drifts = has.get("drift") or (None,) * len(self.A)
+        levels: Any = zip(self.A, self.b, drifts, fits, self.sizes.tolist(), strict=True)
         equations = [
-            Equation(A.copy(), b.copy(), None if d is None else d.copy(), fit, size=size)
-            for A, b, d, fit, size in zip(self.A, self.b, drifts, self._fits, self.sizes.tolist(), strict=True)
+            Equation(A.copy(), b.copy(), None if d is None else d.copy(), fit, name=f"level {k}", size=size)
+            for k, (A, b, d, fit, size) in enumerate(levels)
         ]
-        box = (self.lower.copy(), self.upper.copy()) if len(self.lower) else (None, None)
-        hard = (self.C.copy(), self.c_lower.copy(), self.c_upper.copy()) if len(self.C) else None
-        reference = self.reference.copy() if len(self.reference) else None
+        box = (self.lower.copy(), self.upper.copy()) if "lower" in has else (None, None)
+        hard = (self.C.copy(), self.c_lower.copy(), self.c_upper.copy()) if "C" in has else None
+        reference = self.reference.copy() if "reference" in has else None
         return Problem(tuple(equations), lower=box[0], upper=box[1], constraints=hard, reference=reference)
 
-    def _refuse(self, k: int) -> None:
-        """Name the number that is none."""
-        name = [name for name, begin in self._begins.items() if begin <= k][-1]  # of those without length, the next
-        value = self._floats[k]
-        if name in ("lower", "c_lower"):
-            i, other = k - self._begins[name], name.replace("lower", "upper")
-            above = self._floats[self._begins[other] + i]
-            raise ProblemError(
-                f"{name}[{i}] is {value:g} and {other}[{i}] {above:g}; expected no lower above its upper"
-            )
-        raise NonFiniteError(f"{name} holds {value:g}; expected finite numbers")
+    def __setattr__(self, name: str, value: Any) -> NoReturn:
+        raise ParameterError(
+            f"{name} cannot be set; expected an array to be filled in place, as in prepared.lower[:] = -1"
+        )
+
+    def __getattr__(self, name: str) -> NoReturn:
+        if name in _OPTIONS:
+            raise AttributeError(f"there is no {name} in this Prepared; expected cc.Prepared(..., {_OPTIONS[name]})")
+        raise AttributeError(f"a Prepared has no {name!r}")
+
+    def __getstate__(self) -> tuple[dict[str, Any], IntArray, FloatArray]:
+        return self._shape, self._ints.copy(), self._floats.copy()
+
+    def __setstate__(self, state: tuple[dict[str, Any], IntArray, FloatArray]) -> None:
+        shape, ints, floats = state
+        self.__init__(**shape)  # type: ignore[misc]
+        self._ints[:], self._floats[:] = ints, floats
+
+    def __repr__(self) -> str:
+        return f"Prepared({', '.join(f'{name}={value!r}' for name, value in self._shape.items())})"

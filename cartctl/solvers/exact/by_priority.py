@@ -32,6 +32,7 @@ from cartctl.solvers.exact.working_set import (
 )
 
 _HUGE, _TINY = 1e120, 1e-120  # entries beyond these are left to the caller to scale
+_LOST = 1e12  # times what the box allows: a command as large is left to the caller, too
 _UNEVEN = 1e-3  # of the largest row: one as small is hidden
 _COARSE = 1e-2  # of the size that commands alone suggest for u: what round-off in them is relative to
 
@@ -67,7 +68,7 @@ def by_priority(
     proofs = np.zeros((p + 1, out_proofs.shape[1]))
     levels = level_table(sizes, fits, scale, C_.shape[0])
     e, q = _arrays(A_, b, d, levels, lower, upper, C_, c_lower, c_upper, reference, n)
-    if _extreme(e, q.C, q.norm):
+    if _extreme(e, q.C, q.norm) or _out_of_proportion(e, q, levels, n):
         return EXTREME
     most = 50 + 10 * (M + q.state.shape[0])
     flags = 0
@@ -131,6 +132,25 @@ def _extreme(e: Equations, C: FloatArray, c_norm: FloatArray) -> bool:
             x = abs(e.A[i, k] if i < M else C[i - M, k])
             if x > _HUGE or 0.0 < x < _TINY:
                 return True
+    return False
+
+
+@part
+def _out_of_proportion(e: Equations, q: Inequalities, levels: Levels, n: int) -> bool:
+    """Whether a command is so far beyond what the box allows that its scale is lost in round-off."""
+    reach = 0.0
+    for k in range(n):
+        reach = max(reach, -q.B[0, k], q.B[1, k])
+    if not 0.0 < reach < np.inf:
+        return False
+    for k in range(levels.sizes.shape[0]):
+        if levels.fits[k] != SCALED:
+            continue
+        size, largest = 0.0, 0.0
+        for i in range(levels.begin[k], levels.begin[k] + levels.sizes[k]):
+            size, largest = max(size, e.norm[i]), max(largest, abs(e.slope[i]))
+        if largest > _LOST * size * reach and size > 0.0:
+            return True
     return False
 
 

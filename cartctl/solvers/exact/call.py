@@ -75,7 +75,9 @@ def _run(arrays: Given, n: int, guess: NDArray[np.int64], proofs: FloatArray) ->
     try:
         flags = lexicographic.compiled(*arrays, guess, u, scales, active, proofs)
         if flags & EXTREME:
-            flags = lexicographic.compiled(*balanced(arrays), guess, u, scales, active, proofs)
+            milder, shares = in_proportion(balanced(arrays))
+            flags = lexicographic.compiled(*milder, guess, u, scales, active, proofs)
+            scales *= shares
     except (ValueError, ArithmeticError) as error:  # a singular value decomposition met infinities
         raise FloatingPointError(str(error)) from None
     if flags & EXTREME:
@@ -104,6 +106,29 @@ def balanced(arrays: Given) -> Given:
         return arrays._replace(
             A=A, b=b, d=d, natural=natural, C=C, c_lower=arrays.c_lower / most, c_upper=arrays.c_upper / most
         )
+
+
+def in_proportion(arrays: Given) -> tuple[Given, FloatArray]:
+    """Commands beyond 1e12 times what the box allows made milder, and the share of each level's that is left.
+
+    Each level is slowed by far more than that, so that what it comes to is the same.
+    """
+    shares = np.ones(arrays.sizes.shape[0])
+    reach = float(max(np.abs(arrays.lower).max(initial=0.0), np.abs(arrays.upper).max(initial=0.0)))
+    if not 0.0 < reach < np.inf or not np.isfinite(arrays.b).all():
+        return arrays, shares
+    b, row = np.array(arrays.b), 0
+    for k, (size, kind) in enumerate(zip(arrays.sizes, arrays.fits, strict=True)):
+        if kind == INTERVAL:
+            continue
+        own = slice(row, row + size)
+        row += size
+        bearable = float(np.sqrt((arrays.A[own] ** 2).sum(axis=1)).max(initial=0.0)) * reach
+        asked = float(np.abs(b[own]).max(initial=0.0))
+        if kind == SCALED and asked > 1e9 * bearable > 0.0:
+            shares[k] = 1e6 * (bearable / asked)
+            b[own] *= shares[k]
+    return arrays._replace(b=b), shares
 
 
 def arrays_of(problem: Problem, fitted: bool) -> Given:
