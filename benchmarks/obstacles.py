@@ -174,7 +174,7 @@ def line(save: bool, seconds: float) -> None:
         save_rows(RESULTS / "obstacles_line.csv", rows, setting())
 
 
-MARGIN, BRAKING = 0.01, 0.25  # m, and m/s^2, which all pairs of both arms can keep to at a time
+MARGIN, BRAKING = 0.015, 0.25  # m, and m/s^2, which all pairs of both arms can keep to at a time
 
 
 def reach(

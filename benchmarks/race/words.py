@@ -48,10 +48,11 @@ def paragraph(found: list[dict[str, str]]) -> str:
     ik = {r["who"]: r for r in found if r["job"] == "ik"}
     own, other = (f"{us(ik[who])} us and {ik[who]['success']}" for who in POSES)
     text = (
-        "Beside other tools, the Panda on one path under position and velocity limits, us a step (`make race`, "
+        "Beside other tools, the Panda on one path under position and velocity limits, us a step of the "
+        "whole loop, its Python included (`make race`, "
         f"[results](benchmarks/results/race.csv)): {times}{''.join(f'; {who} did not finish' for who in lost)}. "
-        f"At most {um(mine)} um off the path, the others {um(off[near])} ({near}) to {um(off[far])} ({far}), "
-        "being told where it will be after the step, tsid its acceleration. Inverse kinematics of random poses: "
+        f"cartctl strays up to {um(mine)} um from the path, the others {um(off[near])} ({near}) to {um(off[far])} "
+        f"({far}), being told where it will be after the step, tsid its acceleration. Inverse kinematics of random poses: "
         f"{own} found, the Robotics Toolbox's `ik_LM` {other}. What each of them does better: "
         "[docs/comparison.md](docs/comparison.md). More times: [docs/measurements.md](docs/measurements.md)."
     )
