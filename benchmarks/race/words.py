@@ -54,7 +54,8 @@ def paragraph(found: list[dict[str, str]]) -> str:
         f"cartctl strays up to {um(mine)} um from the path, the others {um(off[near])} ({near}) to {um(off[far])} "
         f"({far}), being told where it will be after the step, tsid its acceleration. "
         f"Inverse kinematics of random poses: {own} found, the Robotics Toolbox's `ik_LM` {other}. "
-        "What each of them does better: [docs/comparison.md](docs/comparison.md). More times: [docs/measurements.md](docs/measurements.md)."
+        "What each of them does better: [docs/comparison.md](docs/comparison.md). "
+        "More times: [docs/measurements.md](docs/measurements.md)."
     )
     return "\n".join(textwrap.wrap(text, 120, break_long_words=False, break_on_hyphens=False)) + "\n"
 
