@@ -9,6 +9,7 @@ import os
 import re
 import socket
 import subprocess
+import time
 from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
@@ -278,9 +279,12 @@ def test_browser_plays_by_itself(planar_page: Path, tab: Tab) -> None:
     first = tab.look(planar_page, "", (1000, 400))
     began = tab.ask("Number(document.getElementById('time').value)")
     tab.until(f"Math.abs(Number(document.getElementById('time').value) - {began}) > 0.2")
-    second = tab.picture()
+    until = time.monotonic() + 60.0
+    while (
+        difference(first, second := tab.picture(), slice(20, 320), slice(0, 560)) <= 0.01
+    ):  # a busy machine draws late
+        assert time.monotonic() < until
     assert not second.console and not second.requests
-    assert difference(first, second, slice(20, 320), slice(0, 560)) > 0.01
 
 
 @needs_chromium

@@ -10,6 +10,7 @@ import os
 import signal
 import threading
 from collections.abc import Callable, Iterable, Iterator
+from functools import cache
 from itertools import chain, islice
 from typing import Any
 
@@ -49,6 +50,7 @@ def processes(workers: int) -> Engine:
                 waiting[job.key] = job
                 yield delayed(_deaf)(job)
 
+        _hush_loky()
         stream = iter(jobs)
         while True:
             again = list(waiting.values())
@@ -72,17 +74,18 @@ def processes(workers: int) -> Engine:
                         f"worker processes died {deaths} times without a result, at work on {at}; all finished runs "
                         "are kept. Leave the culprit out, or run with --workers 1 to see how it dies"
                     ) from None
-            except (GeneratorExit, KeyboardInterrupt):
-                _hush_loky()
-                raise
             finally:
                 made.close()
 
     return engine
 
 
+@cache
 def _hush_loky() -> None:
-    """A pool that is cut short may have its table emptied under its own thread, which then dies with a traceback."""
+    """A pool that is cut short may have its table emptied under its own thread, which then dies with a traceback.
+
+    For good, and beforehand: joblib empties the table before anybody hears of the interrupt.
+    """
     usual = threading.excepthook
 
     def hook(what: threading.ExceptHookArgs) -> None:
