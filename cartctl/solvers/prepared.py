@@ -130,7 +130,8 @@ class Prepared:
             flags = self._call(self._ints, self._floats)
         except (ValueError, ArithmeticError):  # a singular value decomposition met infinities
             flags = EXTREME
-        return (None if flags < 0 else _STATUS[flags]) or self._by_problem()
+        status = _STATUS[flags] if flags >= 0 else None
+        return self._by_problem() if status is None else status
 
     def _by_problem(self) -> Status:
         found = SNS().solve(self.problem())
