@@ -80,6 +80,7 @@ NEARLY_SINGULAR = {
     (30003, 1995324): "feasible at a single point of the rows",
     (30003, 2195699): "what nearly dependent members magnify is no licence to miss a row",
     (50001, 908067): "the same, among rows that are dependent twice over",
+    (93001, 15930889): "a dependent row that is missed by 1e-8",
     (92001, 48188177): "a u of 1e-16 beside bounds of 3",
     (90001, 3709332): "a fit that misses by hardly more than round-off presses against bounds",
 }

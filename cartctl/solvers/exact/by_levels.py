@@ -33,7 +33,7 @@ from cartctl.solvers.exact.working_set import (
 )
 
 _MISSED = 1e-9  # relative: a row of an interval level that is missed by less is met
-_DRIFTED = 3e-8  # relative: a dependent row that is missed by more was not what it seemed
+_DRIFTED = 1e-9  # relative: a dependent row that is missed by more was not what it seemed
 
 
 @part
