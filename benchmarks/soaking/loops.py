@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Callable
 from time import perf_counter
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
@@ -31,22 +32,45 @@ class Loops(NamedTuple):
     failures: list[Failure]
 
 
+class Scened(Protocol):
+    """A scene that was run, and what came of it."""
+
+    scene: Scene
+    made: int
+    certificates: int
+    worst: float
+    excess: float
+    size: float
+    statuses: Counter[str]
+
+    def run(self) -> str:
+        """What went wrong, or nothing."""
+
+
 def run(seed: int, first: int, seconds: float, scenes: int = 1 << 30, spoil: float = 0.0) -> tuple[Loops, int]:
     """Scenes first.. until the time is over or so many were made; and the next one's index."""
+
+    def make(index: int) -> Loop:
+        return Loop(scene(seed, index), np.random.default_rng([seed, index, 1]), spoil)
+
+    return gathered(make, f"--scene {seed}", first, seconds, scenes)
+
+
+def gathered(make: Callable[[int], Scened], command: str, first: int, seconds: float, scenes: int) -> tuple[Loops, int]:
+    """What came of make(first), ... until the time is over or so many were run; and the next one's index."""
     until, index = perf_counter() + seconds, first
     steps, certificates, worst, excess = 0, 0, 0.0, 0.0
     statuses: Counter[str] = Counter()
     failures: list[Failure] = []
     while index < first + scenes and (index == first or perf_counter() < until):
-        loop = Loop(scene(seed, index), np.random.default_rng([seed, index, 1]), spoil)
-        what = loop.run()
+        made = make(index)
+        what = made.run()
         if what:
-            command = f"--scene {seed} {index}"
-            failures.append(Failure(f"{what} at step {loop.made} ({loop.scene.words})", loop.size, command))
-        steps += loop.made
-        certificates += loop.certificates
-        worst, excess = max(worst, loop.worst), max(excess, loop.excess)
-        statuses += loop.statuses
+            failures.append(Failure(f"{what} ({made.scene.words})", made.size, f"{command} {index}"))
+        steps += made.made
+        certificates += made.certificates
+        worst, excess = max(worst, made.worst), max(excess, made.excess)
+        statuses += made.statuses
         index += 1
     return Loops(steps, statuses, certificates, worst, excess, failures), index
 
@@ -64,7 +88,11 @@ class Loop:
         self.nothing = np.zeros(scene.controller.robot.nv)
 
     def run(self) -> str:
-        """What went wrong, or nothing."""
+        """What went wrong and when, or nothing."""
+        what = self._run()
+        return what and f"{what} at step {self.made}"
+
+    def _run(self) -> str:
         controller = self.scene.controller
         robot, dt = controller.robot, controller.dt
         q, v, a = self.scene.q, self.nothing, self.nothing

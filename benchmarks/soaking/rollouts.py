@@ -7,13 +7,11 @@ velocities, and now and then a certificate.
 from __future__ import annotations
 
 from collections import Counter
-from time import perf_counter
 
 import numpy as np
 
 import cartctl as cc
-from soaking.batch import Failure
-from soaking.loops import Loops, proven, rooms
+from soaking.loops import Loops, gathered, proven, rooms
 from soaking.scenes import Scene, rolled_scene, start
 
 STARTS, STEPS = 64, 250  # of one scene
@@ -24,21 +22,7 @@ _WRONG = ("FAILED", "RECOVERING")
 
 def run(seed: int, first: int, seconds: float, scenes: int = 1 << 30, spoil: float = 0.0) -> tuple[Loops, int]:
     """Scenes first.. until the time is over or so many were made; and the next one's index."""
-    until, index = perf_counter() + seconds, first
-    steps, certificates, worst, excess = 0, 0, 0.0, 0.0
-    statuses: Counter[str] = Counter()
-    failures: list[Failure] = []
-    while index < first + scenes and (index == first or perf_counter() < until):
-        rolled = Rolled(seed, index, spoil)
-        what = rolled.run()
-        if what:
-            failures.append(Failure(f"{what} ({rolled.scene.words})", rolled.size, f"--rollouts {seed} {index}"))
-        steps += rolled.made
-        certificates += rolled.certificates
-        worst, excess = max(worst, rolled.worst), max(excess, rolled.excess)
-        statuses += rolled.statuses
-        index += 1
-    return Loops(steps, statuses, certificates, worst, excess, failures), index
+    return gathered(lambda index: Rolled(seed, index, spoil), f"--rollouts {seed}", first, seconds, scenes)
 
 
 class Rolled:
