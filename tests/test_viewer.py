@@ -422,7 +422,7 @@ def test_what_is_changed_on_the_page_is_done(controller: cc.Controller) -> None:
         with panel._lock:
             panel._pressed.add("home")
         wait(lambda: np.allclose(session.q, controller.robot.home, atol=1e-6))
-        assert show.scene.target(0).isApprox(moved(controller, [0.0, 0.0, 0.0]), 1e-6)
+        wait(lambda: show.scene.target(0).isApprox(moved(controller, [0.0, 0.0, 0.0]), 1e-6))
 
 
 def test_playing_leaves_the_tasks_as_they_were(controller: cc.Controller, monkeypatch: pytest.MonkeyPatch) -> None:
