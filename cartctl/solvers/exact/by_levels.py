@@ -55,7 +55,7 @@ def by_levels(
     """
     sizes, fits, begin, hard = levels.sizes, levels.fits, levels.begin, levels.hard
     n, p = u.shape[0], sizes.shape[0]
-    saved, states = new_working_set(n), np.empty(q.state.shape[0], np.int64)
+    saved, states = new_working_set(n, 0.0), np.empty(q.state.shape[0], np.int64)
     flags = 0
     for i in range(n + hard, q.state.shape[0]):
         q.state[i] = SILENT
@@ -113,7 +113,7 @@ def by_levels(
                 return CONTRADICTORY
             feasible = True
             scales[k] = math.nan
-            flags |= DOUBT if outcome >= 0 else DOUBT | STUCK
+            flags |= DOUBT  # one that came to no end is skipped without a proof
         feasible = feasible or outcome == MET
         k += 1
     if not settled:

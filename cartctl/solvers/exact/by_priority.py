@@ -56,15 +56,18 @@ def by_priority(
     scales: FloatArray,
     active: NDArray[np.int64],
     out_proofs: FloatArray,
+    surely: float,
 ) -> int:
     """Fill out (n,), scales (p,), active (count, then codes) and, if it has columns, out_proofs (p + 1, M + n + r).
 
     sizes, fits, scale: rows, kind and natural norm (0: that of A) of each level. d, reference, lower and upper may be
     empty. Rows of interval levels are the last ones of C, in order. start: a guess of the active inequalities, as
-    ``active`` is. DOUBT among the flags: something was decided by little more than round-off, or proven impossible.
+    ``active`` is. surely: times what round-off may leave of a normal that depends on others, which near singularities
+    magnify: as much is nothing. DOUBT among the flags: something was decided by little more than round-off, or proven
+    impossible.
     """
     n, M, p = out.shape[0], A_.shape[0], sizes.shape[0]
-    w, u = new_working_set(n), np.empty(n)
+    w, u = new_working_set(n, surely), np.empty(n)
     proofs = np.zeros((p + 1, out_proofs.shape[1]))
     levels = level_table(sizes, fits, scale, C_.shape[0])
     e, q = _arrays(A_, b, d, levels, lower, upper, C_, c_lower, c_upper, reference, n)

@@ -33,6 +33,7 @@ from cartctl.solvers.exact.working_set import (
     NEARLY,
     NUM,
     SUM,
+    SURELY,
     G,
     H,
     WorkingSet,
@@ -47,7 +48,7 @@ SETTLED, STALLED = -1, -2  # else the code of the inequality that cannot be met 
 
 _EPS = 2.0**-52
 DEPENDENT = 1e-11  # of a unit normal: what is left of it is round-off
-_SURELY = 30.0  # times what round-off may leave
+_SURELY = 30.0  # times the round-off in a sum
 SMALL = 1e-11  # of the largest coefficient of a combination
 _CLEARLY = 1e-6  # of a unit normal: a guess that adds less is left out
 _SUMMED = 1e-12  # of the terms of a sum: round-off
@@ -113,7 +114,7 @@ def load(w: WorkingSet, q: Inequalities, start: NDArray[np.int64], s: float) -> 
 @part
 def independence(w: WorkingSet) -> float:
     """The norm above which what is left of the unit normal taken apart last is more than round-off."""
-    return max(DEPENDENT, _SURELY * noise(w))
+    return max(DEPENDENT, w.V[SURELY, 0] * noise(w))  # type: ignore[no-any-return]
 
 
 @part

@@ -2,9 +2,9 @@
 
 Near singularities decisions come down to round-off: whether a row is dependent, a vertex degenerate, a contradiction
 one. An answer that met such a decision, or that proves something impossible, is judged by its own multipliers
-(:mod:`cartctl.algebra.proofs`); one that fails is sought again without the guess, and then with joints, rows and the
-unit of u in other orders, which take other ways to the same optimum. The best by its multipliers is kept, and what none
-of them proves is flagged UNPROVEN.
+(:mod:`cartctl.algebra.proofs`); one that fails is sought again without the guess, then with joints, rows and the unit
+of u in other orders, which take other ways to the same optimum, and last from what it ended with. The best by its
+multipliers is kept, and what none of them proves is flagged UNPROVEN.
 """
 
 from __future__ import annotations
@@ -23,6 +23,8 @@ _check = part(check_proofs.function)
 
 _PROVEN = 1e-7  # residuals of multipliers: an answer this good is taken
 _WAYS = 12  # other orders that are tried
+_ROUND_OFF = 30.0  # times what round-off leaves of a normal: nothing
+_DUST = 5e3  # or 1e-12 of the entries, as in a URDF that writes pi with 12 digits
 
 
 @kernel(
@@ -52,7 +54,7 @@ def lexicographic(
     """:func:`by_priority`'s answer, or a better one if it was in doubt; the flags."""
     flags = by_priority(
         A, b, d, sizes, fits, natural, lower, upper, C, c_lower, c_upper, reference, start, out, scales, active,
-        out_proofs,
+        out_proofs, _ROUND_OFF,
     )  # fmt: skip
     if flags & DOUBT == 0 or flags & (EXTREME | CONTRADICTORY):
         return flags
@@ -75,13 +77,15 @@ def _sure(
     nobody = np.zeros(1, np.int64)
     best = np.inf
     u, s, members = np.empty(n), np.empty(p), np.empty(n + 2, np.int64)
-    for way in range(-2 if start.shape[0] > 0 and start[0] > 0 else -1, _WAYS):
-        order = order_of(m, n, max(way, -1))
+    for way in range(-2 if start.shape[0] > 0 and start[0] > 0 else -1, _WAYS + 1):
+        order = order_of(m, n, max(way, -1) if way < _WAYS else -1)
+        guess = start if way == -2 else active.copy() if way == _WAYS else nobody
         other = disguised(m, order)
         proofs = np.zeros((p + 1, m.A.shape[0] + n + m.C.shape[0]))
         found = by_priority(
             other.A, other.b, other.d, other.sizes, other.fits, other.natural, other.lower, other.upper, other.C,
-            other.c_lower, other.c_upper, other.reference, start if way == -2 else nobody, u, s, members, proofs,
+            other.c_lower, other.c_upper, other.reference, guess, u, s, members, proofs,
+            _DUST if way >= 0 and way % 3 == 0 else _ROUND_OFF,
         )  # fmt: skip
         if found & (EXTREME | CONTRADICTORY):
             continue

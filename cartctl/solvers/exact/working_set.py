@@ -30,6 +30,7 @@ Y = 3  # the members' share in the proof that s cannot be larger
 LAM = 4  # multipliers
 H, SUM, Z = 5, 6, 7  # scratch: a normal's components along Q; as a sum of members; what of it is orthogonal to them
 ERR = 8  # by how much round-off may have turned a row of Q
+SURELY = 9  # its first entry: how many times what round-off may leave of a normal is still nothing
 
 # Rows of K.
 WHO, KIND = 0, 1  # an inequality's code or -1 - row of an equation; FIXED, FREE or TIED
@@ -42,16 +43,16 @@ class WorkingSet(NamedTuple):
 
     Q: FloatArray  # (n + 1, n)
     R: FloatArray  # (n + 1, n + 1)
-    V: FloatArray  # (9, n + 1)
+    V: FloatArray  # (10, n + 1)
     K: NDArray[np.int64]  # (4, n + 1)
 
 
 @part
-def new_working_set(n: int) -> WorkingSet:
+def new_working_set(n: int, surely: float) -> WorkingSet:
     """An empty one in R^n."""
-    return WorkingSet(
-        np.empty((n + 1, n)), np.empty((n + 1, n + 1)), np.zeros((9, n + 1)), np.zeros((4, n + 1), np.int64)
-    )
+    V = np.zeros((10, n + 1))
+    V[SURELY, 0] = surely
+    return WorkingSet(np.empty((n + 1, n)), np.empty((n + 1, n + 1)), V, np.zeros((4, n + 1), np.int64))
 
 
 @part
