@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import numpy as np
 
 import cartctl as cc
+
+DATA = Path(__file__).parent / "data"
 
 
 def arm(seed: int, dust: float) -> cc.Problem:
@@ -44,7 +47,7 @@ def test_dust_decides_nothing() -> None:
 
 def test_a_large_level_that_comes_to_no_end_is_skipped_with_a_proof() -> None:
     """60 joints, a task whose largest scale is 0: of two contradictions each puts the other in its place for ever."""
-    x = np.load(Path(__file__).parent / "data" / "large_nearly_singular.npz")
+    x = np.load(DATA / "large_nearly_singular.npz")
     fits = ["scale", "scale", "scale", "least_squares"]
     equations = [cc.Equation(x[f"A{k}"], x[f"b{k}"], fit=fit) for k, fit in enumerate(fits)]
     problem = cc.Problem(
@@ -54,3 +57,13 @@ def test_a_large_level_that_comes_to_no_end_is_skipped_with_a_proof() -> None:
     assert found.status is cc.Status.SKIPPED
     np.testing.assert_array_equal(found.scales, [1.0, 1.0, np.nan, 1.0])
     assert found.certificate().holds()
+
+
+def test_a_small_share_of_a_large_proof_counts() -> None:
+    """Shares of 1e11 and 1e7 in what limits a scale: the small one is no round-off of the others."""
+    given = json.loads((DATA / "stretched_arm.json").read_text())
+    A, b = np.array(given["A"]), np.array(given["b"])
+    hand, elbow = cc.Equation(A[:2], b[:2]), cc.Equation(A[2:], b[2:])
+    found = cc.solve(cc.Problem([hand, elbow], lower=given["lower"], upper=given["upper"]), "sns")
+    assert found.status is cc.Status.SKIPPED and found.certificate().holds()
+    np.testing.assert_allclose(found.scales, [0.007778873765953, np.nan], rtol=1e-9)

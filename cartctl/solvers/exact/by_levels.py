@@ -113,7 +113,8 @@ def by_levels(
                 return CONTRADICTORY
             feasible = True
             scales[k] = math.nan
-            flags |= DOUBT  # one that came to no end is skipped without a proof
+            # a scaled level that came to no end is skipped without a proof; a fitted one cannot be
+            flags |= DOUBT if outcome >= 0 or fits[k] == SCALED else DOUBT | STUCK
         feasible = feasible or outcome == MET
         k += 1
     if not settled:

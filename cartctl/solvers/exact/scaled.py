@@ -44,6 +44,7 @@ from cartctl.solvers.exact.working_set import (
     H,
     WorkingSet,
     Y,
+    Z,
     append,
     combine,
     largest_entry,
@@ -56,6 +57,7 @@ MET, SKIPPED = 0, 1  # how a level went; or STALLED
 
 _NOTHING = 1e-13  # s below this is zero
 _STEEP = 1e3  # a share this large in what limits s: it magnifies round-off
+_LAST_BITS = 1e-15  # of a unit normal: round-off in its components
 _WORSE = 10.0  # a normal with a share this large stands better outside the working set
 
 
@@ -131,14 +133,14 @@ def _cut(
         combine(w, w.V[H], w.V[SUM])  # afresh: updated from cut to cut, it would gather round-off
     elif implied != NOBODY:
         q.state[implied >> 1] = OUT
-    floor = SMALL * largest_coefficient(w)
+    _round_off(w)
     constant, slope = right_side(q, code), 0.0
     for j in range(w.K[NUM, 0]):
         constant -= w.V[SUM, j] * w.V[C0, j]
         slope -= w.V[SUM, j] * w.V[C1, j]
         w.V[Y, j] = -w.V[SUM, j]
         if w.K[KIND, j] != FIXED:
-            w.K[KIND, j] = TIED if w.V[Y, j] > floor else FREE
+            w.K[KIND, j] = TIED if w.V[Y, j] > w.V[Z, j] else FREE
             if w.K[KIND, j] == FREE:
                 w.V[Y, j] = 0.0
     if not slope > 0.0 or constant > END * slope:
@@ -152,12 +154,26 @@ def _cut(
 
 
 @part
+def _round_off(w: WorkingSet) -> None:
+    """Into z what is round-off in each share of ``sum``, which a member that is near others magnifies."""
+    R, z, q = w.R, w.V[Z], w.K[NUM, 0]
+    floor = SMALL * largest_coefficient(w)
+    for j in range(q - 1, -1, -1):
+        t = _LAST_BITS
+        for k in range(j + 1, q):
+            t += abs(R[k, j]) * z[k]
+        z[j] = t / R[j, j]
+    for j in range(q):
+        z[j] = max(z[j], floor)
+
+
+@part
 def _tightest(w: WorkingSet) -> tuple[int, float]:
     """How much of the old proof keeps every share of the new one positive, and the member that then cancels (-1)."""
-    floor = SMALL * largest_coefficient(w)
+    _round_off(w)
     leaving, share = -1, 0.0
     for j in range(w.K[NUM, 0]):
-        if w.K[KIND, j] == TIED and w.V[SUM, j] > floor and w.V[SUM, j] > share * w.V[Y, j]:
+        if w.K[KIND, j] == TIED and w.V[SUM, j] > w.V[Z, j] and w.V[SUM, j] > share * w.V[Y, j]:
             leaving, share = j, w.V[SUM, j] / w.V[Y, j]
     return leaving, share
 
