@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from functools import cache
 from typing import NamedTuple
 
@@ -111,23 +112,34 @@ def test_any_planar_arm(name, solver, kind, level, accelerations):
     assert_rests(rolled(robot, stack(robot, kind, target), solver, level, accelerations))
 
 
-OPEN = {  # robot, seed, solver, level, accelerations
-    ("lwr", 2, "sns", "velocity", True),
-    ("lwr", 2, "hqp", "velocity", True),
-}
-
-
 @pytest.mark.parametrize("level, accelerations", FORMS)
 @pytest.mark.parametrize("solver", ["sns", "hqp"])
 @pytest.mark.parametrize("seed", range(5))
 @pytest.mark.parametrize("name", ["panda", "lwr", "kinova"])
-def test_any_direction(name, seed, solver, level, accelerations, request):
-    if (name, seed, solver, level, accelerations) in OPEN:
-        late = "open: it rests, but later than the deadline, swinging about the edge"
-        request.node.add_marker(pytest.mark.xfail(strict=True, reason=late))
+def test_any_direction(name, seed, solver, level, accelerations):
     robot = arm(name)
     found = rolled(robot, stack(robot, "position", far_away(robot, seed)), solver, level, accelerations)
     assert_rests(found)
+
+
+@pytest.mark.parametrize("solver", ["sns", "hqp"])
+@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("kind", ["pose", "ranked"])
+@pytest.mark.parametrize("name", ["panda", "lwr"])
+def test_any_direction_of_a_pose(name, kind, seed, solver):
+    """No null space at full speed for what little a joint at its limit leaves of a pose, or of what ranks below."""
+    robot = arm(name)
+    assert_rests(rolled(robot, stack(robot, kind, far_away(robot, seed)), solver, "velocity", False))
+
+
+@pytest.mark.parametrize("level, accelerations", FORMS)
+@pytest.mark.parametrize("solver, seed", [("hqp", 7), ("hqp", 15), ("hqp", 19), ("sns", 19)])
+def test_who_has_far_to_go_rests_in_the_end(solver, seed, level, accelerations, monkeypatch):
+    """Slow joints and long ways round, which no deadline allows for: no motion is left at the end, and no reversal."""
+    monkeypatch.setattr(sys.modules[__name__], "DURATION", 14.0)
+    robot = arm("kinova")
+    found = rolled(robot, stack(robot, "position", far_away(robot, seed)), solver, level, accelerations)
+    assert_rests(found._replace(deadline=12.0))
 
 
 @pytest.mark.parametrize(
@@ -168,7 +180,7 @@ def test_by_accelerations(name, kind, solver):
         target[:2, 3] = 4.0, 2.0
         best = {"pose": 1.978389, "position": 1.472136}  # the second is sqrt(20) - 3
     found = rolled(robot, stack(robot, kind, target), solver, "acceleration", True)
-    late = 0.5 if (name, solver) == ("panda", "hqp") and kind.startswith("pose") else 0.0  # s, what it takes more
+    late = 1.0 if (name, solver, kind) == ("panda", "hqp", "pose+posture") else 0.0  # s, what it takes more
     assert_rests(found._replace(deadline=found.deadline + late))
     assert abs(found.error - best[kind.partition("+")[0]]) <= 1e-3
 

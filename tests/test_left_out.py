@@ -38,16 +38,21 @@ def drawn(rng):
     return A, b, lower, upper
 
 
+def outwards(by, lower, upper):
+    return ((by > 0.0) & (abs(upper) <= STILL)) | ((by < 0.0) & (abs(lower) <= STILL))
+
+
 @pytest.mark.parametrize("moving", [False, True])
-def test_the_slope_says_who_is_left_out_before_a_target_at_rest(moving):
-    """``A^T b`` there, ``A# b`` (damped) where the target moves; who cannot stop within the step is never left out."""
+def test_slope_or_step_says_who_is_left_out_before_a_target_at_rest(moving):
+    """``A^T b`` or ``A# b`` (damped) there, the step alone where the target moves; never who cannot stop in time."""
     rng = np.random.default_rng(3)
-    met, joints = 0, np.array([np.full(7, np.inf), np.ones(7), np.full(7, STILL)])
+    met, joints = 0, np.array([np.full(7, np.inf), np.ones(7), np.full(7, STILL), np.full(7, np.inf)])
     for _ in range(300):
         A, b, lower, upper = drawn(rng)
         slope, inverse = A.T @ b, np.linalg.pinv(A) @ b
-        by = inverse if moving else slope
-        expected = ((by > 0.0) & (abs(upper) <= STILL)) | ((by < 0.0) & (abs(lower) <= STILL))
+        downhill, wanted = outwards(slope, lower, upper), outwards(inverse, lower, upper)
+        by = np.where(downhill & (not moving), slope, inverse)
+        expected = wanted if moving else downhill | wanted
         met += int(np.sum(np.sign(slope) != np.sign(inverse)))
         left, s, right = np.linalg.svd(A, full_matrices=False)
         reduced, stood, size = A.copy(), np.full(7, np.nan), float(np.linalg.norm(A))
@@ -66,10 +71,24 @@ def test_a_joint_that_leads_nowhere_is_not_left_out():
     """Its column is round-off, and so is its slope."""
     A, b = np.array([[1.0, 0.5, 1e-17], [0.0, 1.0, -3e-17]]), np.array([2.0, 1.0])
     left, s, right = np.linalg.svd(A, full_matrices=False)
-    joints, nothing = np.array([np.full(3, np.inf), np.ones(3), np.full(3, STILL)]), np.zeros(3)
+    joints, nothing = np.array([np.full(3, np.inf), np.ones(3), np.full(3, STILL), np.full(3, np.inf)]), np.zeros(3)
     rows, stood = (np.zeros((0, 3)), np.zeros(0), np.zeros(0)), np.empty(3)
     assert leave_out(A.copy(), left, s, right, b, joints, nothing, nothing, *rows, 1.5, False, stood)
     np.testing.assert_array_equal(stood, [1.0, 1.0, 0.0])
+
+
+@pytest.mark.parametrize("moving", [False, True])
+def test_a_box_of_accelerations_alone_holds_nobody_back(moving):
+    """A joint that has just set off may at most stop in the next step: no bound at which it stands."""
+    A, b = np.array([[1.0, 0.5, 0.2], [0.0, 1.0, -0.3]]), np.array([-2.0, 1.0])
+    left, s, right = np.linalg.svd(A, full_matrices=False)
+    lower, rows = np.zeros(3), (np.zeros((0, 3)), np.zeros(0), np.zeros(0))
+    for width, found in ((0.2, False), (0.1, True)):  # of 0.2 that accelerations allow
+        joints = np.array([np.full(3, 5.0), np.ones(3), np.full(3, STILL), np.full(3, 0.2)])
+        reduced, stood = A.copy(), np.empty(3)
+        box = (lower, lower + width)
+        assert leave_out(reduced, left, s, right, b, joints, *box, *rows, 1.5, moving, stood) == found
+        assert (reduced[:, 0] == 0.0).all() == found and (stood[0] == -1.0) == found
 
 
 def at_rest(kind, solver, level):

@@ -27,7 +27,9 @@ from cartctl.levels.approach_kernel import (
     SIGMA,
     SLOWING,
     SPEED,
+    STILL,
     TOP_SPEED,
+    WHOLE,
     directions,
     hold,
     is_beyond,
@@ -35,10 +37,8 @@ from cartctl.levels.approach_kernel import (
 )
 from cartctl.levels.left_out import is_pressed, level_of, stands
 
-_BENT, _BENDS, _CLEAR = 1e-3, 0.5, 1e-2  # as in levels.approach
-_NO_FREEDOM = 1e-9  # as in levels.calming
+_BENT, _THROUGH, _BENDS, _CLEAR = 1e-3, 0.1, 0.5, 1e-2  # as in levels.approach
 _WANTED = 1e-3  # as in levels.left_out
-_STILL = 2  # row of the joints' array: a bound this close to zero blocks
 _SWEEPS = 12
 _LEVEL = 2e-16  # of the Jacobian's size squared: the round-off in its squares
 _SLIGHT = 5e-5  # radians: below this, what series leave out is less than round-off
@@ -223,11 +223,13 @@ def _left_out(
             stood[j] += W[k, j] * total
     flat = level_of(b, size)
     for j in range(n):
-        still, by = joints[_STILL, j], wanted[j]
+        still, whole, by = joints[STILL, j], joints[WHOLE, j], wanted[j]
         if not moving:
             by = stood[j] if abs(stood[j]) > flat else 0.0
         stood[j] = 0.0
-        if not stands(by, lower[j], upper[j], still, False):
+        if not (moving or stands(by, lower[j], upper[j], still, whole, False)):
+            by = wanted[j]
+        if not stands(by, lower[j], upper[j], still, whole, False):
             continue
         if is_pressed(wanted[j], still):
             stood[j] = 1.0 if by > 0.0 else -1.0
@@ -326,7 +328,7 @@ def approached(
             b[a] -= (1.0 - pace) * rate[a]
         for i in range(k):
             D[FORWARD, i] *= pace
-    edge = hold(b, U[:m, :k], D[:, :k], dt, size, True, out[:m])
+    edge = hold(b, U[:m, :k], Vt[:k], D[:, :k], joints, dt, size, True, not moving, out[:m])
     if moving or not is_beyond(edge, D, k, size):
         for j in range(n):
             room.stood[j] = 0.0
@@ -432,51 +434,8 @@ def _bend_as_before(
         asked += U[a, i] * out[a]
     for j in range(n):
         before += bent[j] * side * Vt[i, j]
-    if bent[n] != 0.0 and asked * D[BEND, i] > 0.0 and before < 0.0:
+    near = D[SIGMA, i] <= _THROUGH * abs(D[BEND, i])
+    if near and bent[n] != 0.0 and asked * D[BEND, i] > 0.0 and before < 0.0:
         through = 2.0 * D[SIGMA, i] * D[SIGMA, i] / (abs(D[BEND, i]) * dt)
         for a in range(m):
             out[a] -= U[a, i] * (asked + (through if asked >= 0.0 else -through))
-
-
-@part
-def calmed(above: FloatArray, asked: FloatArray, J: FloatArray, b: FloatArray, calm: float) -> None:
-    """Slow b (m,) down until the motion that the tasks above leave to it is no faster than calm."""
-    n = J.shape[1]
-    U, s, Vt = np.linalg.svd(above, full_matrices=True)
-    rank = 0
-    while rank < s.shape[0] and s[rank] > _NO_FREEDOM * s[0]:
-        rank += 1
-    given = np.zeros(n)
-    for i in range(rank):
-        t = 0.0
-        for a in range(asked.shape[0]):
-            t += U[a, i] * asked[a]
-        t /= s[i]
-        for j in range(n):
-            given[j] += Vt[i, j] * t
-    m, free = J.shape[0], n - rank
-    base, reduced = np.zeros(m), np.zeros((m, free))
-    for i in range(m):
-        for j in range(n):
-            base[i] += J[i, j] * given[j]
-            for k in range(free):
-                reduced[i, k] += J[i, j] * Vt[rank + k, j]
-    if free == 0:
-        for i in range(m):
-            b[i] = base[i]
-        return
-    L, t_, _ = np.linalg.svd(reduced, full_matrices=False)
-    left, fastest_ = np.zeros(t_.shape[0]), 0.0
-    for k in range(t_.shape[0]):
-        for i in range(m):
-            left[k] += L[i, k] * (b[i] - base[i])
-        left[k] = min(max(left[k], -calm * t_[k]), calm * t_[k])
-        if t_[k] > 0.0:
-            fastest_ += (left[k] / t_[k]) ** 2
-    fastest_ = sqrt(fastest_)
-    share = calm / fastest_ if fastest_ > calm else 1.0
-    for i in range(m):
-        total = base[i]
-        for k in range(t_.shape[0]):
-            total += L[i, k] * left[k] * share
-        b[i] = total

@@ -6,7 +6,7 @@ from math import inf, sqrt
 
 from cartctl.checks import FloatArray
 from cartctl.compiled import store_kernel as at
-from cartctl.compiled.approach_kernel import approached, calmed
+from cartctl.compiled.approach_kernel import approached
 from cartctl.compiled.plan_kernel import FRAME, Task
 from cartctl.compiled.store_kernel import (
     Store,
@@ -16,6 +16,7 @@ from cartctl.compiled.store_kernel import (
     straightened,
 )
 from cartctl.kernels import lean_part
+from cartctl.levels.calming_kernel import calmed
 from cartctl.levels.left_out import keep
 
 NV, TASKS, LARGEST, COUNT, BOUNDED = at.NV, at.TASKS, at.LARGEST, at.COUNT, at.BOUNDED
@@ -60,7 +61,7 @@ def hold_back(s: Store) -> None:
     if s.ints[COUNT] % _STRAIGHT == 0:
         straightened(s)
     firsts, room, chain, bounded = index_in(s).first, room_in(s), chain_in(s), s.ints[BOUNDED]
-    joints, lower, upper = s.wide[JOINTS : JOINTS + 3], s.wide[LOWER, :bounded], s.wide[UPPER, :bounded]
+    joints, lower, upper = s.wide[JOINTS : JOINTS + 4], s.wide[LOWER, :bounded], s.wide[UPPER, :bounded]
     turns, others = 2 * r + BESIDE, 2 * r + BESIDE + count * r
     calm, omega, above = inf, 0.0, 0
     for p in range(count):
@@ -91,6 +92,6 @@ def hold_back(s: Store) -> None:
             if easy and _length(b) + omega <= _SURE * calm:
                 s.each[CALM, p] = calm
             else:
-                calmed(s.wide[A : A + first], s.high[B, :first], J, b, calm)
+                calmed(s.wide[A : A + first], s.high[B, :first], J, calm, lower, upper, b)
         calm = min(calm, edge)
         above += 1

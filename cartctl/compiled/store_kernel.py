@@ -20,8 +20,8 @@ LOOKS, INTS_HEAD = 12, 13  # LOOKS: that it is looked, and nothing more
 # the numbers' head: six of room at its end
 DT, PARAMETER, BEFORE, START, BEGAN, SIX, HEAD = 0, 1, 2, 3, 4, 5, 11
 
-# rows of ``wide``, nv each: 11 of the limits, 3 of the approach, then
-LIMITS, JOINTS, U, AT, LOWER, UPPER, X, STOOD, J, A = 0, 11, 14, 15, 16, 17, 18, 19, 20, 26
+# rows of ``wide``, nv each: 11 of the limits, 4 of the approach, then
+LIMITS, JOINTS, U, AT, LOWER, UPPER, X, STOOD, J, A = 0, 11, 15, 16, 17, 18, 19, 20, 21, 27
 # rows of ``high``, one column a row of a task
 POINT, FOUND, GAIN, UNIT, TURNING, ERROR, RATE, BEND, B, B_AGAIN, D_AGAIN, HIGH = 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11
 # rows of ``each``, one column a task

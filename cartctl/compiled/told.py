@@ -76,7 +76,7 @@ class Told:
                 above = Above(ranked=True)
                 for e in equations:
                     above.add(e.A, b[: e.A.shape[0]], calm[k])
-                asked = above.calmed(A[i:j], asked)
+                asked = above.calmed(A[i:j], asked, (out[:n], out[n : 2 * n]) if self._bounded else None)
             if again[k]:
                 asked, drift = b_again[i:j], d_again[i:j] if k == 0 else None
                 fit = "scale" if k == 0 else "least_squares"

@@ -81,7 +81,7 @@ class Workspace:
         if packed is not None:
             s.wide[at.LIMITS : at.LIMITS + 11] = packed
         if joints is not None:
-            s.wide[at.JOINTS : at.JOINTS + 3] = joints
+            s.wide[at.JOINTS : at.JOINTS + 4] = joints
         self.first = np.cumsum([0, *counts])
         index_.first[:] = self.first
         index_.counts[:] = counts

@@ -12,14 +12,18 @@ task's Jacobian, ``J v_i = sigma_i u_i``, with the curvature ``h_i = J_dot(v_i) 
 - the singular configuration is ``theta_i = sigma_i / |u_i . h_i|`` away: towards it
   ``|u_i . b| <= w_i sigma_i min(f(theta_i), eta theta_i / dt)``. ``w_i = 1 - (1e-4 ||J|| / sigma_i)^2`` ends the way
   some 1e-8 of the arm's length before the edge: what is left to win there is not worth the joints' motion, which
-  never ends where several of them stretch the arm, some much more than others.
+  never ends where several of them stretch the arm, some much more than others. Before a target at rest f counts on
+  0.7 a_i: v_i turns on the way, and who relied on all of a_i would swing about the edge;
+- near the edge the directions together are slowed to what the joints' speeds allow of their sum, for solvers that do
+  not scale: what the box cuts off would otherwise be cut off the direction of the smallest sigma_i, the one that
+  leads to the target.
 
 What ranks below a task at the edge moves no faster than the last of these, for in the null space, too, the task curves
 (:mod:`cartctl.levels.calming`); it stands where the edge was reached. On the way back from the edge, an arm bends the
 way it was bent before. Joints that a limit, and directions that a row of a constraint keeps from doing their part are
-left out of J (:mod:`cartctl.levels.left_out`); before a target at rest and out of reach, and where no constraint has
-rows, joints that the highest task presses against their bounds are kept there: the solver's box is made so narrow. Far
-from edge and target, nothing is changed.
+left out of J (:mod:`cartctl.levels.left_out`); before a target at rest and out of reach (for solvers that do not scale:
+too far away for the joints' speeds), and where no constraint has rows, joints that the highest task presses against
+their bounds are kept there: the solver's box is made so narrow. Far from edge and target, nothing is changed.
 """
 
 from __future__ import annotations
@@ -32,8 +36,20 @@ import numpy as np
 
 from cartctl.algebra.svd import scale
 from cartctl.checks import FloatArray
-from cartctl.levels.approach_kernel import ASKED, BEND, FORWARD, ROWS, SIGMA, SLOWING, bend, directions, hold, is_beyond
+from cartctl.levels.approach_kernel import (
+    ASKED,
+    BEND,
+    FORWARD,
+    ROWS,
+    SIGMA,
+    SLOWING,
+    bend,
+    directions,
+    hold,
+    is_beyond,
+)
 from cartctl.levels.calming import Above
+from cartctl.levels.calming_kernel import calmed
 from cartctl.levels.left_out import keep
 from cartctl.model.limits import Limits
 from cartctl.model.state import State
@@ -43,6 +59,7 @@ from cartctl.tasks.base import Reference, Task
 _SHARE = 0.5  # of the acceleration limits: what one direction may count on
 _AT_REST = 1e-6  # of the velocity limit: a bound this close to zero blocks
 _BENT = 1e-3  # of the Jacobian's size: above this singular value it is clear how an arm is bent
+_THROUGH = 0.1  # rad: an edge as near can be gone through, what its curvature says of one farther away is not so
 _BENDS = 0.5  # of what one direction may count on: what a path's bends may take, so that it can also slow down
 _CLEAR = 1e-2  # of the Jacobian's size: damping, for near a singularity a path's bends would ask for it to stand
 _NOTHING = np.zeros(0)
@@ -98,7 +115,8 @@ class Approach:
         slowing = _SHARE * np.minimum(limits.acceleration_upper, -limits.acceleration_lower)
         speed = np.minimum(limits.velocity_upper, -limits.velocity_lower)
         still = _AT_REST * np.where(np.isfinite(speed), speed, 1.0)
-        self._joints = np.array([slowing, speed, still])
+        whole = dt * (limits.acceleration_upper - limits.acceleration_lower)
+        self._joints = np.array([slowing, speed, still, whole])
         self._dt, self._scales = dt, solver.scales
         self._bent: dict[int, FloatArray] = {}  # by task: the motion inwards, when it was last clear
         self._above = Above(ranked=not solver.stacks)
@@ -107,11 +125,11 @@ class Approach:
 
     def prepare(self) -> None:
         """Compile ahead what the first step would otherwise wait for."""
-        _ = directions.compiled, bend.compiled, hold.compiled
+        _ = directions.compiled, bend.compiled, hold.compiled, calmed.compiled
 
     @property
     def joints(self) -> FloatArray:
-        """(3, nv) what each joint can slow down by, its top speed, and the bound that counts as standing still."""
+        """(4, nv) what each joint can slow down by, its top speed, the bound that stands still, a step's widest box."""
         return self._joints
 
     def begin(
@@ -136,7 +154,7 @@ class Approach:
         edge, pace = math.inf, 1.0
         if J.shape[0] and task.fit == "scale":
             b, edge, pace = self._held(task, state, J, reference, b)
-        b = self._above.calmed(J, b)
+        b = self._above.calmed(J, b, self._box)
         self._above.add(J, b, edge)
         return Approached(b, self._above.calm, pace)
 
@@ -148,17 +166,26 @@ class Approach:
             pace = self._pace(task, state, found, reference)
             b = b - (1.0 - pace) * reference.rate
             D[FORWARD] *= pace
-        edge = hold.compiled(b, U, D, self._dt, size, self._scales, out)
+        rests = self._rests(reference)
+        edge = hold.compiled(b, U, Vt, D, self._joints, self._dt, size, self._scales, rests, out)
         if D.shape[1] and D[BEND, -1] != 0.0:
             self._bend_as_before(task, U[:, -1], Vt[-1], D[:, -1], size, out)
-        self._keep(reference, found, edge)
+        self._keep(reference, found, edge, b, out)
         return Approached(out, edge, pace)
 
-    def _keep(self, reference: Reference, found: Directions, edge: float) -> None:
-        """Keep joints at the bounds that the highest task presses them against for a resting target out of reach."""
+    def _rests(self, reference: Reference) -> bool:
+        """Whether a target is at rest, with no rows of a constraint before it."""
+        return reference.rate is None and not self._walls.C.shape[0]
+
+    def _keep(self, reference: Reference, found: Directions, edge: float, asked: FloatArray, held: FloatArray) -> None:
+        """Keep joints at the bounds that the highest task presses them against before a resting target.
+
+        Out of reach, or so far away that the command was held back for the joints' speeds.
+        """
         if self._box is None or reference.rate is not None or not self._above.is_empty:
             return
-        if is_beyond(edge, found.D, found.D.shape[1], found.size):
+        slowed = not self._scales and bool((held != asked).any())
+        if slowed or is_beyond(edge, found.D, found.D.shape[1], found.size):
             keep(found.stood, *self._box)
 
     def _along(
@@ -212,7 +239,8 @@ class Approach:
             return
         before = self._bent.get(id(task))
         asked = float(u @ out)
-        if before is not None and asked * d[BEND] > 0.0 and float(before @ inwards) < 0.0:
+        near = d[SIGMA] <= _THROUGH * abs(d[BEND])
+        if near and before is not None and asked * d[BEND] > 0.0 and float(before @ inwards) < 0.0:
             through = 2.0 * d[SIGMA] * d[SIGMA] / (abs(d[BEND]) * self._dt)
             out -= u * (asked + np.copysign(through, asked))
 

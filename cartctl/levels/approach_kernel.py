@@ -10,13 +10,14 @@ from cartctl.kernels import kernel, lean_part, part
 from cartctl.levels.left_out import leave_out
 
 # Rows of the joints' array.
-SLOWING, TOP_SPEED, STILL = 0, 1, 2
+SLOWING, TOP_SPEED, STILL, WHOLE = 0, 1, 2, 3
 
 # Rows of the directions' array, one column a singular direction.
 SIGMA, FORWARD, FEEDBACK, ERROR, AVAILABLE, SPEED, BEND, PULL, ASKED, NEXT = 0, 1, 2, 3, 4, 5, 6, 7, 8, 9
 ROWS = 10
 
 ETA = 0.5  # of the way to a singular configuration in one step
+TURNS = 0.7  # of the deceleration a direction has: what it counts on towards an edge to stand at, for it turns
 _NOTHING = 1e-12  # of the Jacobian's size: no direction at all
 _WORTH = 1e-4  # of the Jacobian's size: below this singular value there is nothing left to win further outwards
 _CURVED = 4.0  # of the Jacobian's size: what the curvature along a unit motion stays below
@@ -105,7 +106,7 @@ def matters(d: FloatArray, feedback: float, far: float, size: float, dt: float) 
     if abs(feedback) > s * fastest(d[ERROR] * s / (squared + curved * far), d[AVAILABLE], dt):
         return True
     theta = s / curved
-    most = s * min(ETA * theta / dt, fastest(theta, d[AVAILABLE], dt))
+    most = s * min(ETA * theta / dt, fastest(theta, TURNS * d[AVAILABLE], dt))
     return bool(total > _NOTICED * most)
 
 
@@ -120,9 +121,23 @@ def bend(error: FloatArray, U: FloatArray, asked: IntArray, H: FloatArray, D: Fl
         D[BEND, k], D[PULL, k] = along, max(0.0, pull)
 
 
-@kernel("float(vector, matrix, matrix, float, float, bool, out_vector)")
-def hold(b: FloatArray, U: FloatArray, D: FloatArray, dt: float, size: float, scales: bool, out: FloatArray) -> float:
-    """Fill out (m,) with what of b the robot can still stop; the speed of joints left to what ranks below."""
+@kernel("float(vector, matrix, matrix, matrix, matrix, float, float, bool, bool, out_vector)")
+def hold(
+    b: FloatArray,
+    U: FloatArray,
+    Vt: FloatArray,
+    D: FloatArray,
+    joints: FloatArray,
+    dt: float,
+    size: float,
+    scales: bool,
+    rests: bool,
+    out: FloatArray,
+) -> float:
+    """Fill out (m,) with what of b the robot can still stop; the speed of joints left to what ranks below.
+
+    rests: whether the target is at rest, with no rows of a constraint before it.
+    """
     calm, held, allowed = np.inf, False, np.zeros(D.shape[1])
     asked = D[FORWARD] + D[FEEDBACK]
     for k in range(D.shape[1]):
@@ -132,14 +147,16 @@ def hold(b: FloatArray, U: FloatArray, D: FloatArray, dt: float, size: float, sc
             pull = 0.0 if scales else d[PULL]
             most = min(_stoppable(d, pull, dt), _newton(d, dt))
             total = clamp(d[FEEDBACK], -most, most) + d[FORWARD]
-            allowed[k], quiet = _before_the_edge(d, total, dt, size, scales)
+            allowed[k], quiet = _before_the_edge(d, total, dt, size, scales, rests)
             calm = min(calm, quiet)
         held = held or allowed[k] != asked[k]
+    if rests and not scales and calm < np.inf:
+        _fit_together(Vt, D, joints, allowed)
     _put_together(b, U, asked, allowed, held, out)
     return calm
 
 
-@kernel("float(vector, vector, matrix, matrix, float, float, bool, out_vector)")
+@kernel("float(vector, vector, matrix, matrix, float, float, bool, bool, out_vector)")
 def steer(
     y: FloatArray,
     gain: FloatArray,
@@ -148,6 +165,7 @@ def steer(
     dt: float,
     size: float,
     scales: bool,
+    rests: bool,
     out: FloatArray,
 ) -> float:
     """Fill out (m,) with what of the next velocity y, reached by acceleration, can still be stopped; the calm left.
@@ -167,7 +185,7 @@ def steer(
             if d[PULL] > _STIFF * d[SIGMA] * d[SIGMA]:
                 most = min(most, _newton(d, dt))
                 following = clamp(following - d[FORWARD], -most, most) + d[FORWARD]
-            allowed[k], quiet = _before_the_edge(d, following, dt, size, scales)
+            allowed[k], quiet = _before_the_edge(d, following, dt, size, scales, rests)
             calm = min(calm, quiet)
         held = held or allowed[k] != asked[k]
     _put_together(y, U, asked, allowed, held, out)
@@ -195,7 +213,9 @@ def _newton(d: FloatArray, dt: float) -> float:
 
 
 @part
-def _before_the_edge(d: FloatArray, total: float, dt: float, size: float, scales: bool) -> tuple[float, float]:
+def _before_the_edge(
+    d: FloatArray, total: float, dt: float, size: float, scales: bool, rests: bool
+) -> tuple[float, float]:
     """What a direction may carry of ``total``, and the speed of joints that does not spoil it."""
     s, a = d[SIGMA], d[AVAILABLE]
     if not scales:  # a method that scales slows all directions alike; others would bend the command
@@ -207,11 +227,30 @@ def _before_the_edge(d: FloatArray, total: float, dt: float, size: float, scales
     outwards = total * d[BEND] < 0.0
     if outwards:
         worth = max(0.0, 1.0 - (_WORTH * size) ** 2 / (s * s))
-        most = worth * min(most, s * fastest(theta, a, dt))
+        most = worth * min(most, s * fastest(theta, TURNS * a if rests else a, dt))
     calm = np.inf
     if (outwards and abs(total) > _NOTICED * most) or d[PULL] > _PULLED * s * s:
         calm = most / s
     return clamp(total, -most, most), calm
+
+
+@part
+def _fit_together(Vt: FloatArray, D: FloatArray, joints: FloatArray, allowed: FloatArray) -> None:
+    """Slow all directions so far that the joints have the speed for their sum.
+
+    Each by itself is within it. What a box cuts off the sum would be cut off the direction of the smallest singular
+    value, which is the one that leads to a target beyond the edge: turned round, it would lead away and back for ever.
+    """
+    share = 1.0
+    for j in range(Vt.shape[1]):
+        speed = 0.0
+        for k in range(Vt.shape[0]):
+            if D[SIGMA, k] > 0.0:
+                speed += Vt[k, j] * (allowed[k] / D[SIGMA, k])
+        if joints[TOP_SPEED, j] > 0.0:
+            share = max(share, abs(speed) / joints[TOP_SPEED, j])
+    for k in range(Vt.shape[0]):
+        allowed[k] /= share
 
 
 @part

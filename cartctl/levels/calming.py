@@ -2,8 +2,8 @@
 
 With N the null space of the tasks above and v_a the least motion that does what they ask, a task below takes
 ``J N w = b - J v_a``. At the edge J N may lose rank, and what little of a direction is left would be paid for with any
-speed; so ``|w_i| <= calm`` for each singular direction of J N, then ``||w|| <= calm``. A solver that weighs tasks
-instead of ranking them has nothing above: there, b is slowed down as it is.
+speed; so w is the motion of ``||w|| <= calm`` that comes nearest. Joints that are kept where they are have no part in
+it. A solver that weighs tasks instead of ranking them has nothing above: there, b is slowed down as it is.
 """
 
 from __future__ import annotations
@@ -14,9 +14,10 @@ import numpy as np
 
 from cartctl.algebra.svd import norm
 from cartctl.checks import FloatArray
+from cartctl.levels.calming_kernel import calmed
 
-_NO_FREEDOM = 1e-9  # of the largest: singular values of the tasks above below this leave a motion free
 _CLEAR = 1e-6  # of the largest: singular values below this are none
+_NO_BOX = (np.zeros(0), np.zeros(0))
 
 
 class Above:
@@ -43,21 +44,16 @@ class Above:
         self._asked.append(b)
         self.calm = min(self.calm, calm)
 
-    def calmed(self, J: FloatArray, b: FloatArray) -> FloatArray:
+    def calmed(self, J: FloatArray, b: FloatArray, box: tuple[FloatArray, FloatArray] | None) -> FloatArray:
         """``b`` (m,) slowed down until the motion that the tasks above leave to it is no faster than calm."""
         if self.calm == math.inf or not J.shape[0]:
             return b
         if not self._ranked:
             fastest = float(np.linalg.norm(np.linalg.lstsq(J, b, rcond=_CLEAR)[0]))
             return b * (self.calm / fastest) if fastest > self.calm else b
-        U, s, Vt = np.linalg.svd(np.concatenate(self._rows))
-        rank = int(np.count_nonzero(s > _NO_FREEDOM * s[0])) if s.size else 0
-        given = Vt[:rank].T @ ((U[:, :rank].T @ np.concatenate(self._asked)) / s[:rank])
-        L, t, _ = np.linalg.svd(J @ Vt[rank:].T, full_matrices=False)
-        base = J @ given
-        left = np.minimum(np.maximum(L.T @ (b - base), -self.calm * t), self.calm * t)
-        fastest = float(np.linalg.norm(left[t > 0.0] / t[t > 0.0]))
-        slowed: FloatArray = base + L @ left * (self.calm / fastest if fastest > self.calm else 1.0)
+        slowed: FloatArray = b.copy()
+        lower, upper = _NO_BOX if box is None else box
+        calmed.compiled(np.concatenate(self._rows), np.concatenate(self._asked), J, self.calm, lower, upper, slowed)
         return slowed
 
     def slowed(self, u: FloatArray) -> FloatArray:

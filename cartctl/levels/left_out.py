@@ -5,10 +5,11 @@ beyond its bound takes its direction out of every row, ``A (I - c c^T / c^T c)``
 
 What a joint is wanted to do: before a target at rest, to go down the slope of the miss, the sign of ``A^T b``. With the
 joints at their bounds chosen by that sign and held there, the step of the others still leads downhill, whatever their
-scaling; chosen by the sign of the step ``A# b`` itself it need not, and joints take turns at their bounds for ever
+scaling; chosen by the sign of the step ``A# b`` alone it need not, and joints take turns at their bounds for ever
 (Bertsekas 1982, "Projected Newton methods for optimization problems with simple constraints", SIAM J. Control Optim.
-20(2)). A target that moves asks for ``A# b`` exactly, and so it counts there; before rows of constraints, too, whose
-part in a step the slope knows nothing of.
+20(2)). A joint that the step wants beyond its bound is left out as well: it could not do its part, and the others would
+use any speed of the null space for what little of the step is left without it. A target that moves asks for ``A# b``
+exactly, and so it counts there; before rows of constraints, too, whose part in a step the slope knows nothing of.
 """
 
 from __future__ import annotations
@@ -20,7 +21,8 @@ import numpy as np
 from cartctl.checks import FloatArray
 from cartctl.kernels import lean_part, part
 
-_STILL = 2  # row of the joints' array: a bound this close to zero blocks
+_STILL, _WHOLE = 2, 3  # rows of the joints' array: a bound this close to zero blocks; the box of accelerations alone
+_NEARLY = 0.999  # of that
 _AT_BOUND = 1e3  # times that: a noticeable speed, and where a row of C blocks, whose bound moves as the arm does
 _WANTED = 1e-3  # of the Jacobian's size: damping of the motion that says which joints are wanted
 _FLAT = 1e-9  # of the Jacobian's size: a column as small along b leads nowhere
@@ -59,9 +61,12 @@ def leave_out(
             for i in range(m):
                 by += A[i, j] * b[i]
             by = by if abs(by) > flat else 0.0
-        if stands(by, lower[j], upper[j], joints[_STILL, j], fenced and not moving):
+        still, whole = joints[_STILL, j], np.inf if fenced else joints[_WHOLE, j]
+        if not (moving or fenced) and not stands(by, lower[j], upper[j], still, whole, False):
+            by = wanted[j]
+        if stands(by, lower[j], upper[j], still, whole, fenced and not moving):
             A[:, j] = 0.0
-            if fenced or is_pressed(wanted[j], joints[_STILL, j]):
+            if fenced or is_pressed(wanted[j], still):
                 stood[j] = 1.0 if by > 0.0 else -1.0
             found = True
     return _leave_rows_out(A, wanted, joints, stood, C, c_lower, c_upper) or found
@@ -77,13 +82,17 @@ def level_of(b: FloatArray, size: float) -> float:
 
 
 @lean_part
-def stands(wanted: float, lower: float, upper: float, still: float, returning: bool) -> bool:
+def stands(wanted: float, lower: float, upper: float, still: float, whole: float, returning: bool) -> bool:
     """Whether a joint's bounds keep it from what is wanted of it.
+
+    whole: the width of a box that is all due to accelerations, which holds nobody back for longer than a step.
 
     returning: whether a joint on its way back, whose bounds do not even let it stop, counts like one that stands. Where
     it soon can do its part again, leaving it out turns the edge of the workspace, and others are sent to and fro.
     """
     beyond = upper if wanted > 0.0 else -lower
+    if whole < np.inf and upper - lower >= _NEARLY * whole:
+        return False
     return wanted != 0.0 and beyond <= still and (beyond >= -still or returning)
 
 

@@ -87,7 +87,7 @@ class Steering(Approach):
         held, edge = y, math.inf
         if J.shape[0] and task.fit == "scale":
             held, edge = self._held_back(task, task.reference(at, t, anchor), J, y)
-        held = self._above.calmed(J, held)
+        held = self._above.calmed(J, held, self._box)
         self._above.add(J, held, edge)
         return given if held is y or held.tolist() == y.tolist() else Steered(J, held / dt, Jv / dt)
 
@@ -98,8 +98,9 @@ class Steering(Approach):
         found = self._along(task, self._at, J, reference, wanted, y)
         U, _, D, size, _ = found
         out = np.empty(y.shape)
-        edge = self._steer(y, np.atleast_1d(task.gain), U, D, self._dt, size, self._scales, out)
-        self._keep(reference, found, edge)
+        rests = self._rests(reference)
+        edge = self._steer(y, np.atleast_1d(task.gain), U, D, self._dt, size, self._scales, rests, out)
+        self._keep(reference, found, edge, y, out)
         return out, edge
 
     def damping(self, tasks: Sequence[Task]) -> float:
