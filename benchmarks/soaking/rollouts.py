@@ -14,7 +14,7 @@ import cartctl as cc
 from soaking.loops import Loops, gathered, proven, rooms
 from soaking.scenes import Scene, rolled_scene, start
 
-STARTS, STEPS = 64, 250  # of one scene
+STARTS, STEPS = 256, 250  # of one scene
 _SAME = 1e-10  # of a joint's speed limit: what two ways to one velocity may differ by
 _CERTIFIED = 50  # one of so many steps that are stepped again
 _WRONG = ("FAILED", "RECOVERING")
