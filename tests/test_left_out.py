@@ -56,7 +56,7 @@ def test_slope_or_step_says_who_is_left_out_before_a_target_at_rest(moving):
         met += int(np.sum(np.sign(slope) != np.sign(inverse)))
         left, s, right = np.linalg.svd(A, full_matrices=False)
         reduced, stood, size = A.copy(), np.full(7, np.nan), float(np.linalg.norm(A))
-        found = leave_out(reduced, left, s, right, b, joints, lower, upper, *NO_ROWS, size, moving, stood)
+        found = leave_out(reduced, left, s, right, b, joints, lower, upper, *NO_ROWS, size, moving, False, stood)
         assert found == expected.any()
         np.testing.assert_array_equal(reduced, np.where(expected, 0.0, A))
         np.testing.assert_array_equal(stood, np.where(expected & (abs(inverse) > 1e-3), np.sign(by), 0.0))
@@ -73,7 +73,7 @@ def test_a_joint_that_leads_nowhere_is_not_left_out():
     left, s, right = np.linalg.svd(A, full_matrices=False)
     joints, nothing = np.array([np.full(3, np.inf), np.ones(3), np.full(3, STILL), np.full(3, np.inf)]), np.zeros(3)
     rows, stood = (np.zeros((0, 3)), np.zeros(0), np.zeros(0)), np.empty(3)
-    assert leave_out(A.copy(), left, s, right, b, joints, nothing, nothing, *rows, 1.5, False, stood)
+    assert leave_out(A.copy(), left, s, right, b, joints, nothing, nothing, *rows, 1.5, False, False, stood)
     np.testing.assert_array_equal(stood, [1.0, 1.0, 0.0])
 
 
@@ -87,7 +87,7 @@ def test_a_box_of_accelerations_alone_holds_nobody_back(moving):
         joints = np.array([np.full(3, 5.0), np.ones(3), np.full(3, STILL), np.full(3, 0.2)])
         reduced, stood = A.copy(), np.empty(3)
         box = (lower, lower + width)
-        assert leave_out(reduced, left, s, right, b, joints, *box, *rows, 1.5, moving, stood) == found
+        assert leave_out(reduced, left, s, right, b, joints, *box, *rows, 1.5, moving, False, stood) == found
         assert (reduced[:, 0] == 0.0).all() == found and (stood[0] == -1.0) == found
 
 

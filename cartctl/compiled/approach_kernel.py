@@ -363,7 +363,7 @@ def _exactly(
     m, n = J.shape
     U, Vt, D, nothing = np.empty((m, k)), np.empty((k, n)), np.empty((ROWS, k)), room.nothing
     walls = (lower, upper, room.none, nothing, nothing)
-    directions(J, b, nothing, rate, error, joints, *walls, dt, size, lower.shape[0] > 0, U, Vt, D, room.stood)
+    directions(J, b, nothing, rate, error, joints, *walls, dt, size, lower.shape[0] > 0, False, U, Vt, D, room.stood)
     for i in range(k):
         for a in range(m):
             room.U[a, i] = U[a, i]

@@ -122,6 +122,7 @@ class Approach:
         self._above = Above(ranked=not solver.stacks)
         self._walls = Walls(_NOTHING, _NOTHING, np.zeros((0, 0)), _NOTHING, _NOTHING)
         self._box: tuple[FloatArray, FloatArray] | None = None  # the solver's, on u
+        self._fenced = False  # whether there are constraints, with rows in this step or without
 
     def prepare(self) -> None:
         """Compile ahead what the first step would otherwise wait for."""
@@ -144,7 +145,8 @@ class Approach:
         The box is narrowed where a task wants joints kept at their bounds.
         """
         self._above.clear()
-        self._box = None if lower is None or upper is None or rows is not None else (lower, upper)
+        self._fenced = rows is not None
+        self._box = None if lower is None or upper is None or self._fenced else (lower, upper)
         C, c_lower, c_upper = (np.zeros((0, state.v.shape[0])), _NOTHING, _NOTHING) if rows is None else rows
         low, high = (_NOTHING, _NOTHING) if lower is None or upper is None else (lower, upper)
         self._walls = Walls(low, high, C, c_lower, c_upper)
@@ -174,8 +176,8 @@ class Approach:
         return Approached(out, edge, pace)
 
     def _rests(self, reference: Reference) -> bool:
-        """Whether a target is at rest, with no rows of a constraint before it."""
-        return reference.rate is None and not self._walls.C.shape[0]
+        """Whether a target is at rest, with no constraint before it."""
+        return reference.rate is None and not self._fenced
 
     def _keep(self, reference: Reference, found: Directions, edge: float, asked: FloatArray, held: FloatArray) -> None:
         """Keep joints at the bounds that the highest task presses them against before a resting target.
@@ -198,7 +200,9 @@ class Approach:
         rate, error = _NOTHING if reference.rate is None else reference.rate, reference.error
         walls = self._walls if reference.rate is None else self._walls.box()  # before a wall one stops, or slides on
         bounded = walls.lower.shape[0] > 0
-        directions.compiled(J, b, y, rate, error, self._joints, *walls, self._dt, size, bounded, U, Vt, D, stood)
+        directions.compiled(
+            J, b, y, rate, error, self._joints, *walls, self._dt, size, bounded, self._fenced, U, Vt, D, stood
+        )
         self._curvatures(task, state, U, Vt, D, error)
         return Directions(U, Vt, D, size, stood)
 

@@ -28,7 +28,7 @@ _STIFF = 0.25  # of sigma^2: a target this far beyond the edge would make a crit
 
 @kernel(
     "void(matrix, vector, vector, vector, vector, matrix, vector, vector, matrix, vector, vector, float, float, bool, "
-    "out_matrix, out_matrix, out_matrix, out_vector)"
+    "bool, out_matrix, out_matrix, out_matrix, out_vector)"
 )
 def directions(
     J: FloatArray,
@@ -45,6 +45,7 @@ def directions(
     dt: float,
     size: float,
     bounded: bool,
+    fenced: bool,
     U: FloatArray,
     Vt: FloatArray,
     D: FloatArray,
@@ -54,7 +55,7 @@ def directions(
 
     D[ASKED] says whether the direction's curvature matters. y, the next velocity where that is another than b, and
     rate may be empty. Joints and rows of C whose bounds keep them from doing their part are left out of J. stood (n,):
-    the way each joint that was left out is wanted, 0 for others.
+    the way each joint that was left out is wanted, 0 for others. fenced: whether there may be rows, if not now.
     """
     m, n = J.shape
     A = np.empty((m, n))
@@ -65,7 +66,7 @@ def directions(
     stood[:] = 0.0
     if bounded:
         walls = (lower, upper, C, c_lower, c_upper)
-        if leave_out(A, left, s, right, b, joints, *walls, size, rate.shape[0] > 0, stood):
+        if leave_out(A, left, s, right, b, joints, *walls, size, rate.shape[0] > 0, fenced, stood):
             left, s, right = np.linalg.svd(A, full_matrices=False)
     far = 0.0
     for i in range(m):
@@ -136,7 +137,7 @@ def hold(
 ) -> float:
     """Fill out (m,) with what of b the robot can still stop; the speed of joints left to what ranks below.
 
-    rests: whether the target is at rest, with no rows of a constraint before it.
+    rests: whether the target is at rest, with no constraint before it.
     """
     calm, held, allowed = np.inf, False, np.zeros(D.shape[1])
     asked = D[FORWARD] + D[FEEDBACK]

@@ -8,7 +8,8 @@ joints at their bounds chosen by that sign and held there, the step of the other
 scaling; chosen by the sign of the step ``A# b`` alone it need not, and joints take turns at their bounds for ever
 (Bertsekas 1982, "Projected Newton methods for optimization problems with simple constraints", SIAM J. Control Optim.
 20(2)). A joint that the step wants beyond its bound is left out as well: it could not do its part, and the others would
-use any speed of the null space for what little of the step is left without it. A target that moves asks for ``A# b``
+use any speed of the null space for what little of the step is left without it (but not where constraints may have rows,
+and joints are not kept). A target that moves asks for ``A# b``
 exactly, and so it counts there; before rows of constraints, too, whose part in a step the slope knows nothing of.
 """
 
@@ -44,19 +45,21 @@ def leave_out(
     c_upper: FloatArray,
     size: float,
     moving: bool,
+    fenced: bool,
     stood: FloatArray,
 ) -> bool:
     """Change A (m, n); whether anything was left out.
 
-    stood (n,): which way each joint that was left out is wanted, 0 where that is hardly so, as at the target.
+    stood (n,): which way each joint that was left out is wanted, 0 where that is hardly so, as at the target. fenced:
+    whether there are constraints, which may have rows or none: joints are not kept at their bounds then.
     """
     m, n = A.shape
-    wanted, found, fenced = _wanted(left, s, right, b, size), False, C.shape[0] > 0
+    wanted, found, walled = _wanted(left, s, right, b, size), False, C.shape[0] > 0
     flat = level_of(b, size)
     stood[:] = 0.0
     for j in range(n):
         by = wanted[j]
-        if not (moving or fenced):
+        if not (moving or walled):
             by = 0.0
             for i in range(m):
                 by += A[i, j] * b[i]
@@ -64,9 +67,9 @@ def leave_out(
         still, whole = joints[_STILL, j], np.inf if fenced else joints[_WHOLE, j]
         if not (moving or fenced) and not stands(by, lower[j], upper[j], still, whole, False):
             by = wanted[j]
-        if stands(by, lower[j], upper[j], still, whole, fenced and not moving):
+        if stands(by, lower[j], upper[j], still, whole, walled and not moving):
             A[:, j] = 0.0
-            if fenced or is_pressed(wanted[j], still):
+            if walled or is_pressed(wanted[j], still):
                 stood[j] = 1.0 if by > 0.0 else -1.0
             found = True
     return _leave_rows_out(A, wanted, joints, stood, C, c_lower, c_upper) or found
