@@ -82,6 +82,7 @@ NEARLY_SINGULAR = {
     (50001, 908067): "the same, among rows that are dependent twice over",
     (93001, 15930889): "a dependent row that is missed by 1e-8",
     (92001, 48188177): "a u of 1e-16 beside bounds of 3",
+    (95005, 11291664): "a u of 1e-17 where drifts cancel that alone give it a size",
     (95002, 13321952): "a share of 1e-13 in what limits a scale, magnified round-off, held a bound for good",
     (95001, 7498907): "a fitted level that came to no end is none that is skipped",
     (90001, 3709332): "a fit that misses by hardly more than round-off presses against bounds",

@@ -197,7 +197,7 @@ def _rows(
             level[i] = k
             low[i] = s * b[i] - (d[i] if d.shape[0] > 0 else 0.0)
             high[i] = low[i]
-            widest, command = max(widest, span[i]), max(command, abs(b[i]))
+            widest, command = max(widest, span[i]), max(command, abs(b[i]), abs(low[i]))
         for i in range(row, row + sizes[k]):
             span[i] = widest
         if widest > 0.0:
