@@ -22,8 +22,8 @@ What ranks below a task at the edge moves no faster than the last of these, for 
 (:mod:`cartctl.levels.calming`); it stands where the edge was reached. On the way back from the edge, an arm bends the
 way it was bent before. Joints that a limit, and directions that a row of a constraint keeps from doing their part are
 left out of J (:mod:`cartctl.levels.left_out`); before a target at rest and out of reach (for solvers that do not scale:
-too far away for the joints' speeds), and where no constraint has rows, joints that the highest task presses against
-their bounds are kept there: the solver's box is made so narrow. Far from edge and target, nothing is changed.
+too far away for the joints' speeds), and without constraints, joints that the highest task presses against their bounds
+are kept there: the solver's box is made so narrow. Far from edge and target, nothing is changed.
 """
 
 from __future__ import annotations

@@ -8,9 +8,9 @@ joints at their bounds chosen by that sign and held there, the step of the other
 scaling; chosen by the sign of the step ``A# b`` alone it need not, and joints take turns at their bounds for ever
 (Bertsekas 1982, "Projected Newton methods for optimization problems with simple constraints", SIAM J. Control Optim.
 20(2)). A joint that the step wants beyond its bound is left out as well: it could not do its part, and the others would
-use any speed of the null space for what little of the step is left without it (but not where constraints may have rows,
-and joints are not kept). A target that moves asks for ``A# b``
-exactly, and so it counts there; before rows of constraints, too, whose part in a step the slope knows nothing of.
+use any speed of the null space for what little of the step is left without it (not where there are constraints, and
+joints are not kept). A target that moves asks for ``A# b`` exactly, and so it counts there; before rows of constraints,
+too, whose part in a step the slope knows nothing of.
 """
 
 from __future__ import annotations
