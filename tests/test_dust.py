@@ -67,3 +67,15 @@ def test_a_small_share_of_a_large_proof_counts() -> None:
     found = cc.solve(cc.Problem([hand, elbow], lower=given["lower"], upper=given["upper"]), "sns")
     assert found.status is cc.Status.SKIPPED and found.certificate().holds()
     np.testing.assert_allclose(found.scales, [0.007778873765953, np.nan], rtol=1e-9)
+
+
+def test_a_scale_leaves_levels_below_a_point_that_exists() -> None:
+    """A bound is missed by 1e-7 where 1e-14 less of the scale makes room for it: the posture below found no point."""
+    given = {key: np.array(value) for key, value in json.loads((DATA / "folded_arm.json").read_text()).items()}
+    A, b = given["A"], given["b"]
+    hand = cc.Equation(A[:3], b[:3], drift=given["drift"])
+    elbow = cc.Equation(A[3:], b[3:], fit="least_squares")
+    box = {"lower": given["lower"], "upper": given["upper"]}
+    found = cc.solve(cc.Problem([hand, elbow], **box, reference=given["reference"]), "sns")
+    assert found.status is cc.Status.SCALED and found.certificate().holds()
+    np.testing.assert_allclose(found.scales, [4.4798852335e-04, 1.0], rtol=1e-9)

@@ -139,7 +139,7 @@ def hold(
 
     rests: whether the target is at rest, with no constraint before it.
     """
-    calm, held, allowed = np.inf, False, np.zeros(D.shape[1])
+    calm, allowed = np.inf, np.zeros(D.shape[1])
     asked = D[FORWARD] + D[FEEDBACK]
     for k in range(D.shape[1]):
         d = D[:, k]
@@ -150,9 +150,11 @@ def hold(
             total = clamp(d[FEEDBACK], -most, most) + d[FORWARD]
             allowed[k], quiet = _before_the_edge(d, total, dt, size, scales, rests)
             calm = min(calm, quiet)
-        held = held or allowed[k] != asked[k]
     if rests and not scales and calm < np.inf:
         _fit_together(Vt, D, joints, allowed)
+    held = False
+    for k in range(D.shape[1]):
+        held = held or allowed[k] != asked[k]
     _put_together(b, U, asked, allowed, held, out)
     return calm
 

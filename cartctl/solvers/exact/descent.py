@@ -54,6 +54,7 @@ _CLEARLY = 1e-6  # of a unit normal: a guess that adds less is left out
 _SUMMED = 1e-12  # of the terms of a sum: round-off
 _TOUCHED = 1e-9  # of the size of u: and in no case more than this
 _BLURRED = 1e-7  # of the size of u: and no more than this where rows that nearly depend on each other magnify it
+_NO_LOSS = 1e-10  # of a scale: nothing
 _PASSED_ON = 1e-2  # of an equation's coefficient: 1e-13 of it may be in those of inequalities
 _LEAST = 1e-3  # coefficients below this are not what others are compared with
 
@@ -153,6 +154,8 @@ def _touches(w: WorkingSet, side: float, u: FloatArray, s: float, blur: float) -
             settled = False
     round_off = _TOUCHED * size if settled else min(_SUMMED * total, _TOUCHED * size)
     magnified = max(blur * abs(follows), _SURELY * _EPS * total)
+    if missing > round_off and missing <= -_NO_LOSS * follows:
+        return False  # so little less of the scale makes room for it, and levels below are given a point that exists
     touches = missing <= max(round_off, min(magnified, _BLURRED * size))
     if touches and missing > _SUMMED * size:
         w.K[NEARLY, 0] = 1

@@ -74,17 +74,19 @@ def _piece(
     """Slope and bend of half the sum just after ``here``, and where this piece ends."""
     slope, bend, following = 0.0, 0.0, np.inf
     for i in range(start.shape[0]):
-        x = start[i] + here * rate[i]
-        for side in range(2):
-            bound = low[i] if side == 0 else high[i]
-            if rate[i] != 0.0 and abs(bound) < np.inf:
-                crossing = (bound - start[i]) / rate[i]
-                if here < crossing < following:
-                    following = crossing
-        if x < low[i] or (x == low[i] and rate[i] < 0.0):
-            slope += (x - low[i]) * rate[i]
-            bend += rate[i] * rate[i]
-        elif x > high[i] or (x == high[i] and rate[i] > 0.0):
-            slope += (x - high[i]) * rate[i]
-            bend += rate[i] * rate[i]
+        r = rate[i]
+        if r == 0.0:
+            continue
+        # by where the ends of its interval are crossed, never by where it is: the same number on both sides of an end
+        enters = ((low[i] if r > 0.0 else high[i]) - start[i]) / r
+        leaves = ((high[i] if r > 0.0 else low[i]) - start[i]) / r
+        if here < enters:
+            slope += (here - enters) * r * r
+            bend += r * r
+            following = min(following, enters)
+        elif here >= leaves:
+            slope += (here - leaves) * r * r
+            bend += r * r
+        else:
+            following = min(following, leaves)
     return slope, bend, following
