@@ -29,9 +29,9 @@ NV, TASKS, ROWS, BOUNDED, LAST, BEGINS, COUNT = at.NV, at.TASKS, at.ROWS, at.BOU
 A, U, X, LOWER, UPPER, B, B_AGAIN, D_AGAIN, HIGH, ERROR, RATE, BEND = (
     at.A, at.U, at.X, at.LOWER, at.UPPER, at.B, at.B_AGAIN, at.D_AGAIN, at.HIGH, at.ERROR, at.RATE, at.BEND,
 )  # fmt: skip
-WEIGHT, FITTED, WAITS, NATURAL, PACE, SCALE, DELAY, SHARE, OWN, AGAIN, MADE, PATH, CALM = (
+WEIGHT, FITTED, WAITS, NATURAL, PACE, SCALE, DELAY, SHARE, OWN, AGAIN, MADE, PATH, CALM, PACED = (
     at.WEIGHT, at.FITTED, at.WAITS, at.NATURAL, at.PACE, at.SCALE, at.DELAY, at.SHARE, at.OWN, at.AGAIN, at.MADE,
-    at.PATH, at.CALM,
+    at.PATH, at.CALM, at.PACED,
 )  # fmt: skip
 BEFORE, BEGAN, PARAMETER = at.BEFORE, at.BEGAN, at.PARAMETER
 
@@ -206,7 +206,7 @@ def made(s: Store, t: float) -> None:
     count, first = s.ints[TASKS], index_in(s).first
     half = s.bent.shape[0] // 2
     for p in range(count):
-        s.each[MADE, p] = s.each[OWN, p]
+        s.each[MADE, p], s.each[PACED, p] = s.each[OWN, p], s.each[PACE, p]
         if s.each[WAITS, p] == 0.0:
             continue
         s.each[DELAY, p] = t - s.each[OWN, p]

@@ -37,7 +37,7 @@ from cartctl.levels.approach_kernel import (
 )
 from cartctl.levels.left_out import is_pressed, level_of, stands
 
-_BENT, _THROUGH, _BENDS, _CLEAR = 1e-3, 0.1, 0.5, 1e-2  # as in levels.approach
+_BENT, _THROUGH, _BENDS, _RISES, _CLEAR = 1e-3, 0.1, 0.5, 0.2, 1e-2  # as in levels.approach
 _WANTED = 1e-3  # as in levels.left_out
 _SWEEPS = 12
 _LEVEL = 2e-16  # of the Jacobian's size squared: the round-off in its squares
@@ -290,6 +290,7 @@ def approached(
     rate: FloatArray,
     acceleration: FloatArray,
     moving: bool,
+    paced: float,
     joints: FloatArray,
     lower: FloatArray,
     upper: FloatArray,
@@ -304,6 +305,7 @@ def approached(
 
     bent (nv + 1,): the motion inwards when the arm was last clear, and 1 once it is known. turn, other (r, r): the
     left singular vectors of the step before, of J and of what was left of it without joints at their bounds.
+    paced: the pace of the step before.
     room.stood (nv,): which way joints are pressed against bounds that they are to be kept at, 0 for others.
     """
     m, n = J.shape
@@ -323,7 +325,7 @@ def approached(
             D[BEND, i], D[PULL, i] = along, max(0.0, -pulled)
     pace = 1.0
     if moving and task.waits:
-        pace = _pace_of(chain, world, task, m, k, rate, acceleration, joints, size, room)
+        pace = _pace_of(chain, world, task, m, k, rate, acceleration, paced, joints, dt, size, room)
         for a in range(m):
             b[a] -= (1.0 - pace) * rate[a]
         for i in range(k):
@@ -382,12 +384,14 @@ def _pace_of(
     k: int,
     rate: FloatArray,
     acceleration: FloatArray,
+    paced: float,
     joints: FloatArray,
+    dt: float,
     size: float,
     room: Room,
 ) -> float:
     """The share of its speed at which the joints' accelerations can follow the path's bends."""
-    n, x, bend = world.shape[0], room.x, room.h
+    n, x, bend, rises = world.shape[0], room.x, room.h, inf
     U, Vt, D = room.U, room.Vt, room.D
     for turn in range(2):
         for j in range(n):
@@ -400,14 +404,22 @@ def _pace_of(
             for j in range(n):
                 x[j] += Vt[i, j] * t
         if turn == 0:
+            rises = _least_share(joints[SLOWING], x, n)
             task_drift(chain, world, task, x, room, m, bend)
             for a in range(m):
                 bend[a] = acceleration[a] - bend[a]
+    pace = min(1.0, sqrt(_BENDS * _least_share(joints[SLOWING], x, n)))
+    return min(pace, paced + _RISES * rises * dt)
+
+
+@lean_part
+def _least_share(available: FloatArray, x: FloatArray, n: int) -> float:
+    """How many times x the joints can bring about."""
     least = inf
     for j in range(n):
         if x[j] != 0.0:
-            least = min(least, joints[SLOWING, j] / abs(x[j]))
-    return min(1.0, sqrt(_BENDS * least))
+            least = min(least, available[j] / abs(x[j]))
+    return least
 
 
 @lean_part

@@ -23,8 +23,8 @@ NV, TASKS, LARGEST, COUNT, BOUNDED = at.NV, at.TASKS, at.LARGEST, at.COUNT, at.B
 A, JOINTS, LOWER, UPPER, UNIT, ERROR, RATE, BEND, B = (
     at.A, at.JOINTS, at.LOWER, at.UPPER, at.UNIT, at.ERROR, at.RATE, at.BEND, at.B,
 )  # fmt: skip
-KIND, FITTED, PATH, WAITS, WHOLE, PACE, CALM, BESIDE, DT = (
-    at.KIND, at.FITTED, at.PATH, at.WAITS, at.WHOLE, at.PACE, at.CALM, at.BESIDE, at.DT,
+KIND, FITTED, PATH, WAITS, WHOLE, PACE, CALM, PACED, BESIDE, DT = (
+    at.KIND, at.FITTED, at.PATH, at.WAITS, at.WHOLE, at.PACE, at.CALM, at.PACED, at.BESIDE, at.DT,
 )  # fmt: skip
 _STRAIGHT = 128  # steps
 _SURE = 0.99  # of a threshold: what round-off cannot carry across
@@ -81,7 +81,7 @@ def hold_back(s: Store) -> None:
             )
             edge, s.each[PACE, p], omega = approached(
                 chain, s.twelve[n : 2 * n], _task(s, p, first, last), J, b, *asked, s.each[PATH, p] >= 0.0,
-                joints, lower, upper, s.head[DT], _size(J), *memory, room,
+                s.each[PACED, p], joints, lower, upper, s.head[DT], _size(J), *memory, room,
             )  # fmt: skip
             if above == 0 and bounded > 0:
                 keep(room.stood, lower, upper)

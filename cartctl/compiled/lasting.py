@@ -14,8 +14,8 @@ class Memory(NamedTuple):
     """What lasts from step to step, task by task, as the general way holds it.
 
     anchors: what each task holds on to, None before the first step. started: when that was. times: each task's own at
-    the last step. delays, shares: of the clocks. last: when the last step was. bent: how the arm was bent, (nv,) or
-    None.
+    the last step. delays, shares, paces: of the clocks. last: when the last step was. bent: how the arm was bent,
+    (nv,) or None.
     """
 
     anchors: list[Any] | None
@@ -23,6 +23,7 @@ class Memory(NamedTuple):
     times: list[float]
     delays: list[float]
     shares: list[float]
+    paces: list[float]
     last: float | None
     bent: list[FloatArray | None]
 
@@ -70,8 +71,8 @@ class Lasting:
         kept = s.bent[p * (nv + 1) :].reshape(p, nv + 1)
         bent = [row[:nv].copy() if row[nv] else None for row in kept]
         started = store.floats.item(at.BEGAN) if begun else None
-        delays, shares = each[at.DELAY].tolist(), each[at.SHARE].tolist()
-        return Memory(self.anchors, started, self.step_times or [], delays, shares, last, bent)
+        delays, shares, paces = (each[row].tolist() for row in (at.DELAY, at.SHARE, at.PACED))
+        return Memory(self.anchors, started, self.step_times or [], delays, shares, paces, last, bent)
 
     def resume(self, memory: Memory) -> None:
         """Go on from where the general way has come to."""
@@ -79,7 +80,7 @@ class Lasting:
         s, p = store.store, len(store.tasks)
         at.forgotten(s)
         self._anchors = None
-        each[at.DELAY], each[at.SHARE] = memory.delays, memory.shares
+        each[at.DELAY], each[at.SHARE], each[at.PACED] = memory.delays, memory.shares, memory.paces
         store.floats[at.BEFORE] = 0.0 if memory.last is None else memory.last
         if memory.anchors is not None:
             store.ints[at.BEGINS] = 0

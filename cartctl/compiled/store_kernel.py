@@ -26,7 +26,20 @@ LIMITS, JOINTS, U, AT, LOWER, UPPER, X, STOOD, J, A = 0, 11, 15, 16, 17, 18, 19,
 POINT, FOUND, GAIN, UNIT, TURNING, ERROR, RATE, BEND, B, B_AGAIN, D_AGAIN, HIGH = 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11
 # rows of ``each``, one column a task
 KIND, COUNTED, FITTED, WEIGHT, OPEN_POSITION, OPEN_ROTATION, PATH, WAITS, WHOLE = 0, 1, 2, 3, 4, 5, 6, 7, 8
-NATURAL, PACE, SCALE, DELAY, SHARE, OWN, AGAIN, MADE, CURVED, CALM, EACH = 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19
+NATURAL, PACE, SCALE, DELAY, SHARE, OWN, AGAIN, MADE, CURVED, CALM, PACED, EACH = (
+    9,
+    10,
+    11,
+    12,
+    13,
+    14,
+    15,
+    16,
+    17,
+    18,
+    19,
+    20,
+)
 SAMPLE, CURVE = 25, 24  # numbers of a path's sample, and of a curve whose samples are worked out here
 BESIDE = DIRECTION_ROWS + 3  # rows of ``square`` between two matrices and the memories of the singular vectors
 
@@ -159,7 +172,7 @@ def forgotten(s: Store) -> None:
     s.ints[BEGINS], s.ints[COUNT], s.head[BEFORE], s.head[BEGAN] = 1, 0, 0.0, 0.0
     index_in(s).active[0] = 0
     for k in range(p):
-        s.each[DELAY, k], s.each[SHARE, k], s.each[PACE, k] = 0.0, 1.0, 1.0
+        s.each[DELAY, k], s.each[SHARE, k], s.each[PACE, k], s.each[PACED, k] = 0.0, 1.0, 1.0, 1.0
     for i in range(s.bent.shape[0]):
         s.bent[i] = 0.0
 

@@ -61,6 +61,7 @@ _AT_REST = 1e-6  # of the velocity limit: a bound this close to zero blocks
 _BENT = 1e-3  # of the Jacobian's size: above this singular value it is clear how an arm is bent
 _THROUGH = 0.1  # rad: an edge as near can be gone through, what its curvature says of one farther away is not so
 _BENDS = 0.5  # of what one direction may count on: what a path's bends may take, so that it can also slow down
+_RISES = 0.2  # of it: what a path's return to full speed may take, for where it bends less now it may soon bend again
 _CLEAR = 1e-2  # of the Jacobian's size: damping, for near a singularity a path's bends would ask for it to stand
 _NOTHING = np.zeros(0)
 
@@ -119,6 +120,7 @@ class Approach:
         self._joints = np.array([slowing, speed, still, whole])
         self._dt, self._scales = dt, solver.scales
         self._bent: dict[int, FloatArray] = {}  # by task: the motion inwards, when it was last clear
+        self._paces: dict[int, float] = {}  # by task that waits: of the step before
         self._above = Above(ranked=not solver.stacks)
         self._walls = Walls(_NOTHING, _NOTHING, np.zeros((0, 0)), _NOTHING, _NOTHING)
         self._box: tuple[FloatArray, FloatArray] | None = None  # the solver's, on u
@@ -222,16 +224,21 @@ class Approach:
     def _pace(self, task: Task, state: State, found: Directions, reference: Reference) -> float:
         """The share of its speed at which the joints' accelerations can follow the path's bends.
 
-        At the share p they are p^2 times those at full speed, ``J a = r_ddot - J_dot(v) v`` with ``J v = r_dot``.
+        At the share p they are p^2 times those at full speed, ``J a = r_ddot - J_dot(v) v`` with ``J v = r_dot``, and
+        p_dot v where it rises.
         """
         rate, acceleration = reference.rate, reference.acceleration
         assert rate is not None and acceleration is not None
         s = found.D[SIGMA]
         solve = (found.Vt.T * (s / (s * s + (_CLEAR * found.size) ** 2))) @ found.U.T
-        bend = np.abs(solve @ (acceleration - self._drift(task, state, solve @ rate)))
-        with np.errstate(divide="ignore"):
-            room = float(np.min(self._joints[SLOWING] / bend))
-        return min(1.0, math.sqrt(_BENDS * room))
+        v = solve @ rate
+        bends, rises = self._joints_for(solve @ (acceleration - self._drift(task, state, v))), self._joints_for(v)
+        return min(1.0, math.sqrt(_BENDS * bends), self._paces.get(id(task), 1.0) + _RISES * rises * self._dt)
+
+    def _joints_for(self, a: FloatArray) -> float:
+        """How many times the acceleration a (nv,) the joints can bring about."""
+        used = a != 0.0
+        return float(np.min(self._joints[SLOWING][used] / np.abs(a[used]), initial=math.inf))
 
     def _bend_as_before(
         self, task: Task, u: FloatArray, v: FloatArray, d: FloatArray, size: float, out: FloatArray
@@ -251,6 +258,10 @@ class Approach:
     def slowed(self, u: FloatArray) -> FloatArray:
         """What is wanted of the null space, no faster than the tasks leave to it."""
         return self._above.slowed(u)
+
+    def go_on(self, tasks: Iterable[Task], paces: Iterable[float]) -> None:
+        """Go on from the paces of the step before, by task."""
+        self._paces = {id(task): pace for task, pace in zip(tasks, paces, strict=True) if id(task) in self._waiting}
 
     def bends(self, tasks: Iterable[Task]) -> list[FloatArray | None]:
         """How the arm was bent when it was last clear, by task: the motion inwards (nv,), None where it never was."""

@@ -26,16 +26,24 @@ class PathClocks:
         """Show the same time as everybody else's."""
         self._delays = [0.0] * len(self._running)
         self._shares = [1.0] * len(self._running)
+        self._paces = [1.0] * len(self._running)
         self._last: float | None = None
 
     @property
-    def kept(self) -> tuple[list[float], list[float], float | None]:
-        """Delays, shares, and when the last step was: what :meth:`resume` goes on from."""
-        return self._delays, self._shares, self._last
+    def paces(self) -> list[float]:
+        """The share of its speed at which each path was asked for in the last step."""
+        return self._paces
 
-    def resume(self, delays: Sequence[float], shares: Sequence[float], last: float | None) -> None:
+    @property
+    def kept(self) -> tuple[list[float], list[float], list[float], float | None]:
+        """Delays, shares, paces, and when the last step was: what :meth:`resume` goes on from."""
+        return self._delays, self._shares, self._paces, self._last
+
+    def resume(
+        self, delays: Sequence[float], shares: Sequence[float], paces: Sequence[float], last: float | None
+    ) -> None:
         """Go on from another clock."""
-        self._delays, self._shares, self._last = list(delays), list(shares), last
+        self._delays, self._shares, self._paces, self._last = list(delays), list(shares), list(paces), last
 
     def times(self, t: float) -> list[float]:
         """The targets' times at time t."""
@@ -58,6 +66,7 @@ class PathClocks:
             return
         self._delays = [t - own for own in times]
         self._last = t
+        self._paces = [r.pace for r in references]
         self._shares = [
             1.0 if task.rests or not running else r.pace * delivered(e, u)
             for r, e, task, running in zip(references, equations, tasks, self._running, strict=False)

@@ -107,13 +107,15 @@ class Confining:
             raise UnsupportedProblem("jerk limits are not compiled")
         return self._bounds.packed, None if self._approach is None else self._approach.joints
 
-    def at(self, state: State) -> Confines:
-        """What confines u at a state."""
+    def at(self, state: State, tasks: Sequence[Task], paces: Sequence[float]) -> Confines:
+        """What confines u at a state; paces: the share of its speed at which each task's path was asked for last."""
         lower = upper = rows = approach = None
         self.recovering = False
         if self._bounds is not None:
             lower, upper, self.recovering = self._bounds(self._coordinates(state.q), state.v)
             approach = self._approach
+            if approach is not None:
+                approach.go_on(tasks, paces)
         if self._constraints:
             box = None if lower is None or upper is None else Box(lower, upper)
             blocks = stacked([self._level.rows(c, state, self._dt, box) for c in self._constraints])

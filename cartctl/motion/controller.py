@@ -230,7 +230,7 @@ class Controller:
         self._anchors, self._started, self._last = memory.anchors, memory.started, None
         if memory.anchors is not None:
             self._step_times = memory.times
-        self._clocks.resume(memory.delays, memory.shares, memory.last)
+        self._clocks.resume(memory.delays, memory.shares, memory.paces, memory.last)
         self._confining.resume(self.tasks, memory.bent)
 
     @property
@@ -286,7 +286,7 @@ class Controller:
         started = t if self._started is None else self._started
         secondary = self._alone if self.objective is None else self._secondary(t - started)
         times = self._clocks.times(t)
-        confines = self._confining.at(state)
+        confines = self._confining.at(state, self.tasks, self._clocks.paces)
         midway, found = self._confining.midway, None
         if self._fused is not None:
             found = self._fused.answer(state, times, anchors, secondary, confines, self._last)

@@ -149,7 +149,7 @@ def _out_of_proportion(e: Equations, q: Inequalities, levels: Levels, n: int) ->
     for k in range(levels.sizes.shape[0]):
         if levels.fits[k] != SCALED:
             continue
-        size, largest = 0.0, 0.0
+        size, largest = levels.natural[k], 0.0
         for i in range(levels.begin[k], levels.begin[k] + levels.sizes[k]):
             size, largest = max(size, e.norm[i]), max(largest, abs(e.slope[i]))
         if largest > _LOST * size * reach and size > 0.0:

@@ -219,6 +219,8 @@ def _multipliers(w: WorkingSet, gradient: FloatArray, nothing: float, stays: NDA
     orthogonalise(w, np.inf)
     combine(w, w.V[H], w.V[LAM])
     for j in range(w.K[NUM, 0]):
+        if w.K[WHO, j] < 0:
+            continue  # of an equation it has either sign, and levels below may need it a million times over
         returned = w.V[LAM, j] < 0.0 and w.K[KIND, j] == FREE and stays[w.K[WHO, j] >> 1]
         if returned or abs(w.V[LAM, j]) <= nothing:
             w.V[LAM, j] = 0.0
