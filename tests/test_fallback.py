@@ -43,3 +43,34 @@ def test_what_pulls_straight_out_is_not_followed(kind):
     controller = kind(robot, cc.FrameTask("tool", "xy", target=1.5 * out, gain=4.0), "sns", dt=1e-3, limits=None)
     run = cc.simulate(controller, q, duration=0.5)
     assert np.abs(run.v).max() < 1e-6
+
+
+@BOTH
+@pytest.mark.parametrize("level", ["velocity", "acceleration"])
+def test_a_task_of_more_rows_than_the_robot_can_do_is_done_as_far_as_it_can_be(kind, level):
+    """One link, a position in the plane out of its reach: it turns towards it, while it moves and from rest."""
+    robot = cc.planar([1.0])
+    limits = robot.limits.replace(acceleration_lower=-10.0, acceleration_upper=10.0)
+    hand = cc.FrameTask("tool", "xy", target=[3.0, 1.0, 0.0], gain=5.0)
+    run = cc.simulate(kind(robot, hand, "sns", level, limits=limits, dt=1e-2), [-2.0], duration=4.0)
+    assert run.q[-1, 0] == pytest.approx(np.arctan2(1.0, 3.0), abs=1e-3)
+    assert np.abs(run.v[-50:]).max() < 1e-3
+    assert np.abs(np.diff(run.v[:, 0])).max() <= 10.0 * 1e-2 + 1e-9
+
+
+@BOTH
+def test_an_arm_of_five_joints_takes_a_pose_as_near_as_it_comes(kind):
+    """Six rows for five joints: sns arrives where least squares do."""
+    robot = cc.load("so101")
+    rng = np.random.default_rng(3)
+    lower, upper = (np.clip(x, -2.0, 2.0) for x in (robot.limits.position_lower, robot.limits.position_upper))
+    goal = robot.state(rng.uniform(lower, upper)).placement(robot.tool).homogeneous
+    q = rng.uniform(lower, upper)
+    limits = robot.limits.replace(acceleration_lower=-10.0, acceleration_upper=10.0)
+    errors = []
+    for solver in ("sns", "hqp"):
+        hand = cc.FrameTask(robot.tool, target=goal + 0.02 * np.eye(4, k=3), gain=5.0)
+        run = cc.simulate(kind(robot, hand, solver, limits=limits, dt=1e-2), q, duration=6.0)
+        assert np.abs(run.v[-50:]).max() < 1e-3
+        errors.append(np.linalg.norm(run.tasks[0].error[-1]))
+    assert errors[0] == pytest.approx(errors[1], abs=1e-3)

@@ -127,3 +127,40 @@ def test_pressed_joints_are_kept_at_their_bounds(kind):
     assert not kept([turned, hand]).any()
     far = cc.HalfSpace(robot.tool, np.array([0.0, 0.0, 1.0]), 5.0)
     assert not kept(hand, constraints=[far]).any()
+
+
+SLOW = [
+    ([0.0, -2.0, -2.0], [2.0, 2.0, 2.0]),
+    ([0.0, -2.0, -2.0], [0.0, 2.0, 2.0]),
+    ([-1e-3, -2.0, -2.0], [1e-3, 2.0, 2.0]),
+]
+
+
+@pytest.mark.parametrize("lower, upper", SLOW, ids=["one way", "frozen", "slow"])
+@pytest.mark.parametrize("solver", ["sns", "hqp", "qp"])
+@pytest.mark.parametrize("level", ["velocity", "acceleration"])
+def test_the_others_do_what_one_joint_cannot(lower, upper, solver, level):
+    """A target in reach, nothing near an edge: the command was cut down to what the slowest joint could do of it."""
+    robot = cc.planar([1.0, 1.0, 1.0])
+    goal = robot.state([0.2, 1.0, 0.2]).position("tool")
+    limits = robot.limits.replace(
+        velocity_lower=np.array(lower),
+        velocity_upper=np.array(upper),
+        acceleration_lower=-20.0,
+        acceleration_upper=20.0,
+    )
+    hand = cc.FrameTask("tool", "xy", target=goal, gain=5.0)
+    run = cc.simulate(cc.Controller(robot, hand, solver, level, limits=limits, dt=5e-3), [0.2, 0.6, 0.7], duration=3.0)
+    assert np.linalg.norm(run.tasks[0].error[-1]) < 1e-4
+
+
+@pytest.mark.parametrize("joint", [0, 1, 2, 4])
+def test_a_slow_joint_does_not_lead_least_squares_off_a_path(joint):
+    robot = cc.load("panda")
+    bound = robot.limits.velocity_upper.copy()
+    bound[joint] = 0.02
+    limits = robot.limits.replace(velocity_lower=-bound, velocity_upper=bound)
+    circle = cc.Circle.starting_at(robot.state(robot.home).placement(robot.tool), radius=0.1, period=4.0)
+    hand = cc.FrameTask(robot.tool, "position", target=circle)
+    run = cc.simulate(cc.Controller(robot, hand, "hqp", limits=limits, dt=5e-3), robot.home, duration=3.0)
+    assert run.metrics().tasks[0].max_m < 5e-4

@@ -333,3 +333,12 @@ print([batch.q_end.tolist(), batch.v_end.tolist()])
         assert done.returncode == 0, done.stderr
         answers.append(np.array(eval(done.stdout)))  # noqa: S307 - printed above
     np.testing.assert_allclose(answers[0], answers[1], atol=1e-10)
+
+
+def test_a_row_of_dust_is_no_size():
+    """An arm folded back on itself, along which it is asked to move: 1e-15 of a link's length is left of J."""
+    robot = cc.load("planar2R")
+    q0 = np.array([[np.pi, -np.pi], [3.14159265358979, -3.14159265358979], [0.0, 0.0]])
+    hand = cc.FrameTask(robot.tool, "x", target=[7.0, 0.0, 0.0], gain=1.0)
+    batch = cc.simulate_batch(cc.Controller(robot, [hand, cc.PostureTask()], "sns", dt=1e-3), q0, 0.05, history=True)
+    assert "FAILED" not in batch.statuses and np.isfinite(batch.v).all()

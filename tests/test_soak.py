@@ -87,6 +87,7 @@ NEARLY_SINGULAR = {
     (95001, 7498907): "a fitted level that came to no end is none that is skipped",
     (90001, 3709332): "a fit that misses by hardly more than round-off presses against bounds",
     (95005, 22670411): "a row on the end of its interval, by the last bit, was in it and out of it",
+    (96001, 10616408): "a faint fit whose equations' small multipliers are needed a million times over below",
     (20253, 799927): "a scale lowered by less than round-off in it makes room for levels below",
 }
 

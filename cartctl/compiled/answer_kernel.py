@@ -99,19 +99,18 @@ def exact(s: Store) -> int:
             again = again or scales[k] != scales[k]
         if slowed or flags & _EXTREME != 0:
             break
-        if turn == 0 and not again and flags & _LOST != 0 and fits[0] == _SCALED and scales[0] == 0.0:
+        if turn == 0 and flags & _LOST != 0 and fits[0] == _SCALED and not scales[0] > 0.0:
             # no more than the part of the command that the robot can obey here
             beyond = _beyond_reach(s)
             s.each[AGAIN, 0] = 0.0
-            if not beyond:
-                break
-            bits, s.each[AGAIN, 0] = AGAIN_BIT, 1.0
-            for i in range(m):
-                s.high[D_AGAIN, i] = 0.0
-                if i >= firsts[1]:
-                    s.high[B_AGAIN, i] = b[i]
-            b, d = s.high[B_AGAIN, :m], s.high[D_AGAIN, :m]
-            continue
+            if beyond:
+                bits, s.each[AGAIN, 0] = AGAIN_BIT, 1.0
+                for i in range(m):
+                    s.high[D_AGAIN, i] = 0.0
+                    if i >= firsts[1]:
+                        s.high[B_AGAIN, i] = b[i]
+                b, d = s.high[B_AGAIN, :m], s.high[D_AGAIN, :m]
+                continue
         if not again:
             break
         # a task with no feasible scale is slowed

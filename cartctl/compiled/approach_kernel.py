@@ -273,7 +273,7 @@ def _fill(
             share = abs(Vt[k, j])
             if share > 0.0:
                 available = min(available, joints[SLOWING, j] / share)
-                speed = min(speed, joints[TOP_SPEED, j] / share)
+                speed = min(speed, joints[TOP_SPEED, j] / share if joints[TOP_SPEED, j] > 0.0 else inf)
         D[SIGMA, k], D[FORWARD, k], D[FEEDBACK, k], D[ERROR, k] = s[k], forward, total - forward, abs(e)
         D[AVAILABLE, k], D[SPEED, k], D[BEND, k], D[PULL, k], D[NEXT, k] = available, speed, 0.0, 0.0, 0.0
         D[ASKED, k] = 1.0 if matters(D[:, k], total - forward, far, size, dt) else 0.0

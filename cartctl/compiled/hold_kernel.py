@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from math import inf, sqrt
 
-from cartctl.checks import FloatArray
+import numpy as np
+
+from cartctl.checks import FloatArray, IntArray
 from cartctl.compiled import store_kernel as at
-from cartctl.compiled.approach_kernel import approached
+from cartctl.compiled.approach_kernel import approached, task_drift
 from cartctl.compiled.plan_kernel import FRAME, Task
 from cartctl.compiled.store_kernel import (
     Store,
@@ -15,7 +17,9 @@ from cartctl.compiled.store_kernel import (
     room_in,
     straightened,
 )
-from cartctl.kernels import lean_part
+from cartctl.kernels import lean_part, part
+from cartctl.levels.approach_kernel import ASKED, ROWS
+from cartctl.levels.beneath_kernel import held_beneath, narrowed
 from cartctl.levels.calming_kernel import calmed
 from cartctl.levels.left_out import keep
 
@@ -54,6 +58,47 @@ def _task(s: Store, p: int, first: int, last: int) -> Task:
     return Task(kind, index_in(s).joint[p], waits, pose, index_in(s).dof[first:last], s.high[UNIT, first:last])
 
 
+@part
+def _beneath(
+    s: Store,
+    firsts: IntArray,
+    p: int,
+    J: FloatArray,
+    b: FloatArray,
+    joints: FloatArray,
+    lower: FloatArray,
+    upper: FloatArray,
+) -> float:
+    """Hold b back before the edge of what the tasks above leave: :mod:`cartctl.levels.beneath`."""
+    m, n = J.shape
+    M, k, dt, size = firsts[p], min(J.shape), s.head[DT], _size(J)
+    U, Vt, D, stood = np.empty((m, k)), np.empty((k, n)), np.empty((ROWS, k)), np.empty(n)
+    back, base, rest = np.empty((m, M)), np.empty(m), np.empty(m)
+    error = s.high[ERROR, firsts[p] : firsts[p + 1]]
+    above, asked = s.wide[A : A + M], s.high[B, :M]
+    narrowed(above, asked, J, b, error, joints, lower, upper, dt, size, False, U, Vt, D, back, base, rest, stood)
+    q = 0
+    for i in range(k):
+        if D[ASKED, i] != 0.0:
+            q += 1
+    own, others, q = np.zeros((m, q)), np.zeros((M, q)), 0
+    for i in range(k):
+        if D[ASKED, i] != 0.0:
+            for j in range(p + 1):
+                _bends(s, j, Vt[i], own[:, q] if j == p else others[firsts[j] : firsts[j + 1], q])
+            q += 1
+    return held_beneath(error, base, rest, U, Vt, D, joints, back, own, others, dt, size, True, True, b)
+
+
+@lean_part
+def _bends(s: Store, p: int, v: FloatArray, out: FloatArray) -> None:
+    """Fill out with ``J_dot(v) v`` of task p."""
+    first, last = index_in(s).first[p], index_in(s).first[p + 1]
+    if s.each[KIND, p] == FRAME and first < last:
+        n = s.ints[NV]
+        task_drift(chain_in(s), s.twelve[n : 2 * n], _task(s, p, first, last), v, room_in(s), last - first, out)
+
+
 @lean_part
 def hold_back(s: Store) -> None:
     """Hold every task's command back where the robot could not stop, highest priority first."""
@@ -85,6 +130,8 @@ def hold_back(s: Store) -> None:
             )  # fmt: skip
             if above == 0 and bounded > 0:
                 keep(room.stood, lower, upper)
+            if above > 0 and s.each[PATH, p] < 0.0:
+                edge = min(edge, _beneath(s, firsts, p, J, b, joints, lower, upper))
         if calm < inf:
             # of a posture below one task, what is left to it is no more than ||b|| + ||J# b||: calming it would
             # take from it what it cannot have anyway, which is done where somebody asks for its rows

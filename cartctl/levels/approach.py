@@ -48,6 +48,8 @@ from cartctl.levels.approach_kernel import (
     hold,
     is_beyond,
 )
+from cartctl.levels.beneath import Means, hold_beneath
+from cartctl.levels.beneath_kernel import held_beneath, narrowed
 from cartctl.levels.calming import Above
 from cartctl.levels.calming_kernel import calmed
 from cartctl.levels.left_out import keep
@@ -129,6 +131,7 @@ class Approach:
     def prepare(self) -> None:
         """Compile ahead what the first step would otherwise wait for."""
         _ = directions.compiled, bend.compiled, hold.compiled, calmed.compiled
+        _ = narrowed.compiled, held_beneath.compiled
 
     @property
     def joints(self) -> FloatArray:
@@ -158,9 +161,26 @@ class Approach:
         edge, pace = math.inf, 1.0
         if J.shape[0] and task.fit == "scale":
             b, edge, pace = self._held(task, state, J, reference, b)
+            b, beneath = self._beneath(state, task, J, reference, b)
+            edge = min(edge, beneath)
         b = self._above.calmed(J, b, self._box)
-        self._above.add(J, b, edge)
+        self._above.add(J, b, edge, task)
         return Approached(b, self._above.calm, pace)
+
+    def _beneath(
+        self, state: State, task: Task, J: FloatArray, reference: Reference, b: FloatArray
+    ) -> tuple[FloatArray, float]:
+        """``b`` held back before the edge of what the tasks above leave to it, and the calm left below."""
+        above = self._above
+        if reference.rate is not None or not above.ranked or above.is_empty:
+            return b, math.inf
+        walls = self._walls.box()
+        means = Means(self._joints, walls.lower, walls.upper, self._dt, self._scales, self._fenced)
+
+        def curvatures(other: Task | None, along: FloatArray) -> FloatArray:
+            return (other or task).curvatures(state, along)
+
+        return hold_beneath(above, J, b, reference.error, scale(J), means, curvatures, self._box)
 
     def _held(self, task: Task, state: State, J: FloatArray, reference: Reference, b: FloatArray) -> Approached:
         found = self._along(task, state, J, reference, b, _NOTHING)

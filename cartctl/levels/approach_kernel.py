@@ -86,7 +86,7 @@ def directions(
             share = abs(right[k, j])
             if share > 0.0:
                 available = min(available, joints[SLOWING, j] / share)
-                speed = min(speed, joints[TOP_SPEED, j] / share)
+                speed = min(speed, joints[TOP_SPEED, j] / share if joints[TOP_SPEED, j] > 0.0 else np.inf)
         D[SIGMA, k], D[FORWARD, k], D[FEEDBACK, k], D[ERROR, k] = s[k], forward, total - forward, abs(e)
         D[AVAILABLE, k], D[SPEED, k], D[BEND, k], D[PULL, k], D[NEXT, k] = available, speed, 0.0, 0.0, following
         asked = matters(D[:, k], total - forward, far, size, dt)
@@ -221,8 +221,6 @@ def _before_the_edge(
 ) -> tuple[float, float]:
     """What a direction may carry of ``total``, and the speed of joints that does not spoil it."""
     s, a = d[SIGMA], d[AVAILABLE]
-    if not scales:  # a method that scales slows all directions alike; others would bend the command
-        total = clamp(total, -s * d[SPEED], s * d[SPEED])
     if d[BEND] == 0.0:
         return total, np.inf
     theta = s / abs(d[BEND])
@@ -234,6 +232,8 @@ def _before_the_edge(
     calm = np.inf
     if (outwards and abs(total) > _NOTICED * most) or d[PULL] > _PULLED * s * s:
         calm = most / s
+    if rests and not scales and calm < np.inf:  # a method that scales slows all alike; others would bend the command
+        most = min(most, s * d[SPEED])
     return clamp(total, -most, most), calm
 
 

@@ -15,6 +15,7 @@ import numpy as np
 from cartctl.algebra.svd import norm
 from cartctl.checks import FloatArray
 from cartctl.levels.calming_kernel import calmed
+from cartctl.tasks.base import Task
 
 _CLEAR = 1e-6  # of the largest: singular values below this are none
 _NO_BOX = (np.zeros(0), np.zeros(0))
@@ -29,6 +30,7 @@ class Above:
 
     def clear(self) -> None:
         """Begin with the highest priority."""
+        self.tasks: list[Task] = []
         self._rows: list[FloatArray] = []
         self._asked: list[FloatArray] = []
         self.calm = math.inf
@@ -38,8 +40,25 @@ class Above:
         """Whether nothing has been asked for yet."""
         return not any(J.shape[0] for J in self._rows)
 
-    def add(self, J: FloatArray, b: FloatArray, calm: float) -> None:
+    @property
+    def ranked(self) -> bool:
+        """Whether tasks rank above others, and are not weighed against them."""
+        return self._ranked
+
+    @property
+    def rows(self) -> FloatArray:
+        """(M, nv) their J."""
+        return np.concatenate(self._rows)
+
+    @property
+    def asked(self) -> FloatArray:
+        """(M,) what they ask."""
+        return np.concatenate(self._asked)
+
+    def add(self, J: FloatArray, b: FloatArray, calm: float, task: Task | None = None) -> None:
         """One more task, which leaves ``calm``."""
+        if task is not None:
+            self.tasks.append(task)
         self._rows.append(J)
         self._asked.append(b)
         self.calm = min(self.calm, calm)
@@ -53,7 +72,7 @@ class Above:
             return b * (self.calm / fastest) if fastest > self.calm else b
         slowed: FloatArray = b.copy()
         lower, upper = _NO_BOX if box is None else box
-        calmed.compiled(np.concatenate(self._rows), np.concatenate(self._asked), J, self.calm, lower, upper, slowed)
+        calmed.compiled(self.rows, self.asked, J, self.calm, lower, upper, slowed)
         return slowed
 
     def slowed(self, u: FloatArray) -> FloatArray:

@@ -86,9 +86,12 @@ class Steering(Approach):
         y = Jv + dt * (given.b - given.drift)
         held, edge = y, math.inf
         if J.shape[0] and task.fit == "scale":
-            held, edge = self._held_back(task, task.reference(at, t, anchor), J, y)
+            reference = task.reference(at, t, anchor)
+            held, edge = self._held_back(task, reference, J, y)
+            held, beneath = self._beneath(at, task, J, reference, held)
+            edge = min(edge, beneath)
         held = self._above.calmed(J, held, self._box)
-        self._above.add(J, held, edge)
+        self._above.add(J, held, edge, task)
         return given if held is y or held.tolist() == y.tolist() else Steered(J, held / dt, Jv / dt)
 
     def _held_back(self, task: Task, reference: Reference, J: FloatArray, y: FloatArray) -> tuple[FloatArray, float]:

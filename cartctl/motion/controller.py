@@ -373,11 +373,10 @@ class Controller:
         return solution
 
     def _stands_still(self, solution: Solution) -> bool:
-        """Whether the first task's command is scaled to nothing, and a task has lost rank."""
-        if not (solution.lost_rank and type(self.solver) is SNS and not _skipped(solution)):
+        """Whether the first task's command is scaled to nothing, or has no scale, and a task has lost rank."""
+        if not (solution.lost_rank and type(self.solver) is SNS):
             return False
-        first = solution.problem.equations[0]
-        return first.fit == "scale" and first.drift is None and bool(solution.scales[0] == 0.0)
+        return solution.problem.equations[0].fit == "scale" and not bool(solution.scales[0] > 0.0)
 
     def _secondary(self, elapsed: float) -> Secondary:
         """The objective, its share rising as 3 x^2 - 2 x^3 over the soft start."""

@@ -4,13 +4,16 @@
 command clipped into the box, the highest task is asked for ``A u = A u_b + s (b - d - A u_b)``, which has an answer at
 s = 0; a task further down, whose s = 0 those above may rule out, is asked to stand as best it can.
 
-**No scale but 0 is** where b has a part that no u can deliver, at an exact singularity: an arm stretched out would
-stand still for ever. The highest task is then asked for the other part, ``A u = s A u_b``, with u_b of least squares.
+**No scale but 0 is** where b has a part that no u can deliver, at an exact singularity or where a task has more rows
+than the robot can do: an arm stretched out would stand still for ever. The highest task is then asked for the other
+part, ``A u = s A u_b - A u_d``, with u_b and u_d of least squares.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+
+import numpy as np
 
 from cartctl.algebra.problem import Equation, Problem
 from cartctl.algebra.solution import Solution
@@ -40,12 +43,18 @@ def slowed(problem: Problem, skipped: FloatArray, stopping: FloatArray) -> Probl
 def within_reach(problem: Problem, solve: Callable[[Problem], Solution]) -> Problem | None:
     """The problem with the part of its first command that can be obeyed; None where that is all of it."""
     e = problem.equations[0]
-    alone = Equation.trusted(e.A, e.b, None, "least_squares", e.weight, e.name, e.size)
-    along = e.A @ solve(Problem.trusted((alone,), None, None, None, None)).u
-    missed = e.b - along
-    if not float(missed @ missed) > _BEYOND * _BEYOND * float(e.b @ e.b):
+
+    def obeyed(side: FloatArray) -> FloatArray:
+        alone = Equation.trusted(e.A, side, None, "least_squares", e.weight, e.name, e.size)
+        return e.A @ solve(Problem.trusted((alone,), None, None, None, None)).u
+
+    along = obeyed(e.b)
+    drift = 0.0 * along if e.drift is None else obeyed(e.drift)
+    missed = np.concatenate([e.b - along, [] if e.drift is None else e.drift - drift])
+    asked = float(e.b @ e.b) + (0.0 if e.drift is None else float(e.drift @ e.drift))
+    if not float(missed @ missed) > _BEYOND * _BEYOND * asked:
         return None
-    part = Equation.trusted(e.A, along, 0.0 * along, "scale", e.weight, e.name, e.size)
+    part = Equation.trusted(e.A, along, drift, "scale", e.weight, e.name, e.size)
     return _with(problem, [part, *problem.equations[1:]])
 
 

@@ -1,0 +1,71 @@
+"""A task below others, held back before the edge of what those leave to it.
+
+With N the null space of the tasks above, a task below has J N to move with, which loses rank in postures where J is far
+from losing it: a hand in place that cannot turn any further. What is left of b beside the motion that the tasks above
+ask for is held back along the singular directions of J N, as :mod:`cartctl.levels.approach` does it along those of J.
+On the way the tasks above bend, too: along a motion v in their null space, ``h = J_dot(v) v - J A# A_dot(v) v``.
+
+That is for targets at rest and solvers that rank tasks; one that weighs them takes what they ask as it is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from cartctl.checks import FloatArray
+from cartctl.levels.approach_kernel import ASKED, ROWS, is_beyond
+from cartctl.levels.beneath_kernel import held_beneath, narrowed
+from cartctl.levels.calming import Above
+from cartctl.levels.left_out import keep
+from cartctl.tasks.base import Task
+
+
+class Means(NamedTuple):
+    """The joints' figures, the box on the next velocity, seconds of a step; whether commands scale; if fenced."""
+
+    joints: FloatArray
+    lower: FloatArray
+    upper: FloatArray
+    dt: float
+    scales: bool
+    fenced: bool
+
+
+def hold_beneath(
+    above: Above,
+    J: FloatArray,
+    b: FloatArray,
+    error: FloatArray,
+    size: float,
+    means: Means,
+    curvatures: Callable[[Task | None, FloatArray], FloatArray],
+    box: tuple[FloatArray, FloatArray] | None,
+) -> tuple[FloatArray, float]:
+    """``b`` (m,) held back, and the speed that is left to what ranks below (inf far from the edge).
+
+    curvatures: ``J_dot(v) v`` (rows, q) along rows v (q, nv), of a task above or, of None, of this one. box: where
+    joints are kept at their bounds, for a solver that does not scale.
+    """
+    (m, n), rows = J.shape, above.rows
+    k, M = min(m, n), rows.shape[0]
+    U, Vt, D, stood = np.empty((m, k)), np.empty((k, n)), np.empty((ROWS, k)), np.empty(n)
+    back, base, rest = np.empty((m, M)), np.empty(m), np.empty(m)
+    joints, lower, upper, dt, scales, fenced = means
+    narrowed.compiled(
+        rows, above.asked, J, b, error, joints, lower, upper, dt, size, fenced, U, Vt, D, back, base, rest, stood
+    )
+    along = Vt[D[ASKED] != 0.0]
+    own, others = np.zeros((m, len(along))), np.zeros((M, len(along)))
+    if len(along):
+        own = curvatures(None, along)
+        others = np.concatenate([curvatures(task, along) for task in above.tasks])
+    out = b.copy()
+    edge = held_beneath.compiled(
+        error, base, rest, U, Vt, D, joints, back, own, others, dt, size, scales, not fenced, out
+    )
+    if box is not None and not scales and is_beyond(edge, D, k, size):
+        keep(stood, *box)
+    return out, edge
