@@ -5,9 +5,10 @@
 
 The runs are those of ``tests/test_coming_to_rest.py`` with more directions and longer: 16 s at 10 ms towards a target
 1.8 to 4.5 m away, gain 20/s: a position, a whole pose, an orientation ranked below a position, a pose above the posture
-of home. At rest: below 1e-3 of every speed limit from the deadline on, no reversal above 1e-6 of it; the deadline is
-3 s after the earliest time at which the limits let the joints arrive. Later: at rest within the 16 s, but after the
-deadline, for a long way round or a swing about the edge. Moving: not at rest in the last half second.
+of home; and in place: a position in reach, and below it a random orientation, which may be out of reach there. At rest:
+below 1e-3 of every speed limit from the deadline on, no reversal above 1e-6 of it; the deadline is 3 s after the
+earliest time at which the limits let the joints arrive. Later: at rest within the 16 s, but after the deadline, for a
+long way round or a swing about the edge. Moving: not at rest in the last half second.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ sys.path.insert(0, str(Path(__file__).parent.parent))
 from tests import test_coming_to_rest as rest
 
 RESULTS = Path(__file__).parent / "results" / "rest.csv"
-DIRECTIONS = {"position": 20, "pose": 10, "ranked": 10, "pose+posture": 10}
+DIRECTIONS = {"position": 20, "pose": 10, "ranked": 10, "pose+posture": 10, "in place": 10}
 ROBOTS = ("panda", "lwr", "kinova")
 rest.DURATION = 16.0  # s
 
@@ -41,7 +42,9 @@ def row(kind: str, name: str, solver: str, level: str, accelerations: bool) -> d
     """One line of the table."""
     robot, counts = rest.arm(name), {"at_rest": 0, "later": 0, "moving": 0}
     for seed in range(DIRECTIONS[kind]):
-        tasks = rest.stack(robot, kind, rest.far_away(robot, seed))
+        inside = kind == "in place"
+        target = rest.in_place(robot, seed) if inside else rest.far_away(robot, seed)
+        tasks = rest.stack(robot, "ranked" if inside else kind, target)
         counts[verdict(rest.rolled(robot, tasks, solver, level, accelerations))] += 1
     limits = "velocity, acceleration" if accelerations else "velocity"
     what = {"tasks": kind, "robot": name, "solver": solver, "level": level, "limits": limits}

@@ -324,7 +324,7 @@ def approached(
                     pulled += error[a] * h[a]
             D[BEND, i], D[PULL, i] = along, max(0.0, -pulled)
     pace = 1.0
-    if moving and task.waits:
+    if moving and task.waits and size > 0.0:
         pace = _pace_of(chain, world, task, m, k, rate, acceleration, paced, joints, dt, size, room)
         for a in range(m):
             b[a] -= (1.0 - pace) * rate[a]

@@ -186,7 +186,12 @@ class Approach:
         found = self._along(task, state, J, reference, b, _NOTHING)
         U, Vt, D, size, _ = found
         out, pace = np.empty(J.shape[0]), 1.0
-        if id(task) in self._waiting and reference.rate is not None and reference.acceleration is not None:
+        if (
+            id(task) in self._waiting
+            and reference.rate is not None
+            and reference.acceleration is not None
+            and size > 0.0
+        ):
             pace = self._pace(task, state, found, reference)
             b = b - (1.0 - pace) * reference.rate
             D[FORWARD] *= pace
