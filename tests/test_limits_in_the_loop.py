@@ -113,7 +113,7 @@ def test_cartesian_bounds_hold_and_the_task_gets_the_rest():
     hand = cc.FrameTask(robot.tool, "position", gain=10.0, target=start + [0.4, 0.3, 0.0])
     for solver in ("sns", "hqp", "qp"):
         controller = cc.Controller(robot, [hand], solver=solver, dt=2e-3, constraints=[wall])
-        run = cc.simulate(controller, robot.home, 1.5)
+        run = cc.simulate(controller, robot.home, 2.0)
         reached = np.array([robot.state(q).position(robot.tool) for q in run.q])
         assert reached[:, 0].max() <= start[0] + 0.1 + 1e-6, solver
         assert reached[-1, 0] > start[0] + 0.08, solver

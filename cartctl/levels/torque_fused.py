@@ -106,8 +106,10 @@ class FusedTorque:
         )
         if flags & LEFT:
             return None
-        u0 = rows[-2] if drawn else None
         lost = bool(flags & LOST_RANK)
+        if lost and tasks and tasks[0].fit == "scale" and not sides[2, 0] > 0.0:
+            return None  # it is to be asked for what of it can be done
+        u0 = rows[-2] if drawn else None
         put_together = partial(_problem, tasks, sizes, rows, sides, u0, torque)
         solver = self._solver
         solution = Solution(put_together, rows[-1], solver.name, solver, None, lost, sides[2, : len(tasks)])

@@ -107,7 +107,7 @@ class Confining:
             raise UnsupportedProblem("jerk limits are not compiled")
         return self._bounds.packed, None if self._approach is None else self._approach.joints
 
-    def at(self, state: State, tasks: Sequence[Task], paces: Sequence[float]) -> Confines:
+    def at(self, state: State, tasks: Sequence[Task] = (), paces: Sequence[float] = ()) -> Confines:
         """What confines u at a state; paces: the share of its speed at which each task's path was asked for last."""
         lower = upper = rows = approach = None
         self.recovering = False

@@ -374,7 +374,7 @@ class Controller:
 
     def _stands_still(self, solution: Solution) -> bool:
         """Whether the first task's command is scaled to nothing, or has no scale, and a task has lost rank."""
-        if not (solution.lost_rank and type(self.solver) is SNS):
+        if not (solution.lost_rank and isinstance(self.solver, SNS)):
             return False
         return solution.problem.equations[0].fit == "scale" and not bool(solution.scales[0] > 0.0)
 
