@@ -11,7 +11,7 @@ import pytest
 import cartctl as cc
 from cartctl.levels.approach_kernel import ASKED, BEND, ROWS
 from cartctl.levels.beneath_kernel import held_beneath, narrowed
-from tests.test_coming_to_rest import COUNTED, FORMS, STANDS, in_place, limits_of, rolled, stack
+from tests.test_coming_to_rest import FORMS, STANDS, in_place, limits_of, reversals, rolled, stack
 from tests.ways import General
 
 DT = 1e-2  # s
@@ -20,8 +20,7 @@ DT = 1e-2  # s
 def at_the_end(shares, count=200):
     """The largest share of a speed limit and the reversals above 1e-6 of it, in the last steps."""
     last = shares[-count:]
-    turned = (last[1:] * last[:-1] < 0.0) & (np.minimum(abs(last[1:]), abs(last[:-1])) > COUNTED)
-    return np.abs(last).max(), int(turned.sum())
+    return np.abs(last).max(), reversals(last)
 
 
 @pytest.mark.parametrize("solver", ["sns", "hqp"])

@@ -23,7 +23,8 @@ What ranks below a task at the edge moves no faster than the last of these, for 
 way it was bent before. Joints that a limit, and directions that a row of a constraint keeps from doing their part are
 left out of J (:mod:`cartctl.levels.left_out`); before a target at rest and out of reach (for solvers that do not scale:
 too far away for the joints' speeds), and without constraints, joints that the highest task presses against their bounds
-are kept there: the solver's box is made so narrow. Far from edge and target, nothing is changed.
+are kept there: the solver's box is made so narrow. A task below others is held back before the edge of what those leave
+to it, too (:mod:`cartctl.levels.beneath`). Far from edge and target, nothing is changed.
 """
 
 from __future__ import annotations
@@ -176,24 +177,17 @@ class Approach:
             return b, math.inf
         walls = self._walls.box()
         means = Means(self._joints, walls.lower, walls.upper, self._dt, self._scales, self._fenced)
-
-        def curvatures(other: Task | None, along: FloatArray) -> FloatArray:
-            return (other or task).curvatures(state, along)
-
-        return hold_beneath(above, J, b, reference.error, scale(J), means, curvatures, self._box)
+        return hold_beneath(above, task, state, J, b, reference.error, scale(J), means, self._box)
 
     def _held(self, task: Task, state: State, J: FloatArray, reference: Reference, b: FloatArray) -> Approached:
         found = self._along(task, state, J, reference, b, _NOTHING)
         U, Vt, D, size, _ = found
         out, pace = np.empty(J.shape[0]), 1.0
-        if (
-            id(task) in self._waiting
-            and reference.rate is not None
-            and reference.acceleration is not None
-            and size > 0.0
-        ):
+        rate = reference.rate
+        waits = id(task) in self._waiting and reference.acceleration is not None and size > 0.0
+        if waits and rate is not None:
             pace = self._pace(task, state, found, reference)
-            b = b - (1.0 - pace) * reference.rate
+            b = b - (1.0 - pace) * rate
             D[FORWARD] *= pace
         rests = self._rests(reference)
         edge = hold.compiled(b, U, Vt, D, self._joints, self._dt, size, self._scales, rests, out)

@@ -10,7 +10,6 @@ That is for targets at rest and solvers that rank tasks; one that weighs them ta
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -20,6 +19,7 @@ from cartctl.levels.approach_kernel import ASKED, ROWS, is_beyond
 from cartctl.levels.beneath_kernel import held_beneath, narrowed
 from cartctl.levels.calming import Above
 from cartctl.levels.left_out import keep
+from cartctl.model.state import State
 from cartctl.tasks.base import Task
 
 
@@ -36,18 +36,18 @@ class Means(NamedTuple):
 
 def hold_beneath(
     above: Above,
+    task: Task,
+    state: State,
     J: FloatArray,
     b: FloatArray,
     error: FloatArray,
     size: float,
     means: Means,
-    curvatures: Callable[[Task | None, FloatArray], FloatArray],
     box: tuple[FloatArray, FloatArray] | None,
 ) -> tuple[FloatArray, float]:
     """``b`` (m,) held back, and the speed that is left to what ranks below (inf far from the edge).
 
-    curvatures: ``J_dot(v) v`` (rows, q) along rows v (q, nv), of a task above or, of None, of this one. box: where
-    joints are kept at their bounds, for a solver that does not scale.
+    box: where joints are kept at their bounds, for a solver that does not scale.
     """
     (m, n), rows = J.shape, above.rows
     k, M = min(m, n), rows.shape[0]
@@ -60,8 +60,8 @@ def hold_beneath(
     along = Vt[D[ASKED] != 0.0]
     own, others = np.zeros((m, len(along))), np.zeros((M, len(along)))
     if len(along):
-        own = curvatures(None, along)
-        others = np.concatenate([curvatures(task, along) for task in above.tasks])
+        own = task.curvatures(state, along)
+        others = np.concatenate([other.curvatures(state, along) for other in above.tasks])
     out = b.copy()
     edge = held_beneath.compiled(
         error, base, rest, U, Vt, D, joints, back, own, others, dt, size, scales, not fenced, out

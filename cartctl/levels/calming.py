@@ -25,7 +25,7 @@ class Above:
     """The tasks above, in this step: their J and b, and the largest speed, in the norm of v, that they leave."""
 
     def __init__(self, ranked: bool) -> None:
-        self._ranked = ranked
+        self.ranked = ranked  # or all are weighed against each other
         self.clear()
 
     def clear(self) -> None:
@@ -39,11 +39,6 @@ class Above:
     def is_empty(self) -> bool:
         """Whether nothing has been asked for yet."""
         return not any(J.shape[0] for J in self._rows)
-
-    @property
-    def ranked(self) -> bool:
-        """Whether tasks rank above others, and are not weighed against them."""
-        return self._ranked
 
     @property
     def rows(self) -> FloatArray:
@@ -67,7 +62,7 @@ class Above:
         """``b`` (m,) slowed down until the motion that the tasks above leave to it is no faster than calm."""
         if self.calm == math.inf or not J.shape[0]:
             return b
-        if not self._ranked:
+        if not self.ranked:
             fastest = float(np.linalg.norm(np.linalg.lstsq(J, b, rcond=_CLEAR)[0]))
             return b * (self.calm / fastest) if fastest > self.calm else b
         slowed: FloatArray = b.copy()

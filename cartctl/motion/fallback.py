@@ -49,10 +49,10 @@ def within_reach(problem: Problem, solve: Callable[[Problem], Solution]) -> Prob
         return e.A @ solve(Problem.trusted((alone,), None, None, None, None)).u
 
     along = obeyed(e.b)
-    drift = 0.0 * along if e.drift is None else obeyed(e.drift)
-    missed = np.concatenate([e.b - along, [] if e.drift is None else e.drift - drift])
-    asked = float(e.b @ e.b) + (0.0 if e.drift is None else float(e.drift @ e.drift))
-    if not float(missed @ missed) > _BEYOND * _BEYOND * asked:
+    given = np.zeros_like(e.b) if e.drift is None else e.drift
+    drift = given if e.drift is None else obeyed(given)
+    missed, asked = np.concatenate([e.b - along, given - drift]), np.concatenate([e.b, given])
+    if not float(missed @ missed) > _BEYOND * _BEYOND * float(asked @ asked):
         return None
     part = Equation.trusted(e.A, along, drift, "scale", e.weight, e.name, e.size)
     return _with(problem, [part, *problem.equations[1:]])
