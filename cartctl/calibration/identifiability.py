@@ -20,6 +20,7 @@ from cartctl.calibration.tall import tall_r
 from cartctl.checks import FloatArray
 
 _SHARE = 1e-6  # of a null direction's largest entry, below which a parameter has no part in it
+_TIE = 1e-6  # by how much more a parameter counts than the one before it
 
 
 @dataclass(frozen=True)
@@ -97,7 +98,9 @@ def _relations(
     k = null.shape[1]
     if not k:
         return [], set()
-    pivots = qr(null.T, mode="r", pivoting=True)[1][:k]
+    # of parameters that do the same, round-off would choose: the later ones are taken for the directions' own
+    later = 1.0 + _TIE * np.arange(len(null))
+    pivots = qr(null.T * later, mode="r", pivoting=True)[1][:k]
     reduced = lu_solve(lu_factor(null[pivots].T), null.T).T  # the pivots' rows become unit vectors
     found = []
     for column in reduced.T:
