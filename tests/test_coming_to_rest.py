@@ -29,6 +29,7 @@ class Rolled(NamedTuple):
     error: float
     excess: float
     deadline: float  # s: no arm gets from the first to the last posture sooner, plus REST
+    misses: np.ndarray  # (N, p) how far each task is from its target
 
 
 @cache
@@ -80,20 +81,20 @@ def rolled(robot, tasks, solver, level, accelerations, duration=None, **options)
     limits = limits_of(robot, accelerations)
     controller = cc.Controller(robot, tasks, solver, level, limits=limits, dt=DT, **options)
     q, v, excess = robot.home, np.zeros(robot.nv), 0.0
-    x, shares = [robot.coordinates(q)], []
+    x, shares, misses = [robot.coordinates(q)], [], []
     for k in range(round((duration or DURATION) / DT)):
         command = controller.step(q, v, k * DT)
         before = v
         q, v = advance(robot, q, v, command, DT)
         x.append(robot.coordinates(q))
         shares.append(v / limits.velocity_upper)
+        misses.append([float(np.linalg.norm(reference.error)) for reference in command.references])
         over = [x[-1] - limits.position_upper, limits.position_lower - x[-1], np.abs(v) - limits.velocity_upper]
         over.append((np.abs(v - before) / DT - limits.acceleration_upper) * 1e-3)  # a difference of v, over dt
         excess = max(excess, float(np.max(over)))
     fastest = float(np.max(np.abs(x[-1] - x[0]) / limits.velocity_upper))
     ramp = float(np.max(limits.velocity_upper / limits.acceleration_upper))
-    error = float(np.linalg.norm(command.references[0].error))
-    return Rolled(np.array(x), np.array(shares), error, excess, fastest + ramp + REST)
+    return Rolled(np.array(x), np.array(shares), misses[-1][0], excess, fastest + ramp + REST, np.array(misses))
 
 
 def reversals(shares):

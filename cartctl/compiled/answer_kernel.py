@@ -12,6 +12,7 @@ from cartctl.compiled import store_kernel as at
 from cartctl.compiled.solve_kernel import damped, least_above, met, ranked
 from cartctl.compiled.store_kernel import Store, index_in
 from cartctl.kernels import lean_part, part
+from cartctl.levels.patience_kernel import PATIENCE, forget, look_on
 from cartctl.solvers.exact import kinds
 from cartctl.solvers.exact.lexicographic import lexicographic
 
@@ -25,15 +26,18 @@ SNS, DLS, TASK_PRIORITY = 0, 1, 2  # solvers
 AGAIN_BIT, LOST_BIT = 16, 32  # beside the status: a task was asked again for something else; one lost rank
 _BEYOND = 1e-6  # of a command: a part as large that cannot be obeyed
 
-NV, TASKS, ROWS, BOUNDED, LAST, BEGINS, COUNT = at.NV, at.TASKS, at.ROWS, at.BOUNDED, at.LAST, at.BEGINS, at.COUNT
-A, U, X, LOWER, UPPER, B, B_AGAIN, D_AGAIN, HIGH, ERROR, RATE, BEND = (
-    at.A, at.U, at.X, at.LOWER, at.UPPER, at.B, at.B_AGAIN, at.D_AGAIN, at.HIGH, at.ERROR, at.RATE, at.BEND,
+NV, TASKS, ROWS, BOUNDED, HELD, LAST, BEGINS, COUNT = (
+    at.NV, at.TASKS, at.ROWS, at.BOUNDED, at.HELD, at.LAST, at.BEGINS, at.COUNT,
 )  # fmt: skip
-WEIGHT, FITTED, WAITS, NATURAL, PACE, SCALE, DELAY, SHARE, OWN, AGAIN, MADE, PATH, CALM, PACED = (
+A, U, X, JOINTS, LOWER, UPPER, B, B_AGAIN, D_AGAIN, GIVEN, HIGH, ERROR, RATE, BEND = (
+    at.A, at.U, at.X, at.JOINTS, at.LOWER, at.UPPER, at.B, at.B_AGAIN, at.D_AGAIN, at.GIVEN, at.HIGH, at.ERROR, at.RATE,
+    at.BEND,
+)  # fmt: skip
+WEIGHT, FITTED, WAITS, NATURAL, PACE, SCALE, DELAY, SHARE, OWN, AGAIN, MADE, PATH, CALM, PACED, MISSED, SIZE = (
     at.WEIGHT, at.FITTED, at.WAITS, at.NATURAL, at.PACE, at.SCALE, at.DELAY, at.SHARE, at.OWN, at.AGAIN, at.MADE,
-    at.PATH, at.CALM, at.PACED,
+    at.PATH, at.CALM, at.PACED, at.MISSED, at.SIZE,
 )  # fmt: skip
-BEFORE, BEGAN, PARAMETER = at.BEFORE, at.BEGAN, at.PARAMETER
+BEFORE, BEGAN, PARAMETER, DT = at.BEFORE, at.BEGAN, at.PARAMETER, at.DT
 
 
 @lean_part
@@ -79,6 +83,17 @@ def _beyond_reach(s: Store) -> bool:
 
 
 @lean_part
+def _set_apart(s: Store, m: int) -> bool:
+    """Set what the motion above does to a task apart from what is its own, in D_AGAIN and B_AGAIN: whether there is."""
+    apart = False
+    for i in range(m):
+        given = s.high[GIVEN, i]
+        s.high[B_AGAIN, i], s.high[D_AGAIN, i] = s.high[B, i] - given, -given
+        apart = apart or given != 0.0
+    return apart
+
+
+@lean_part
 def exact(s: Store) -> int:
     """The exact optimum: how it went, and the bits."""
     p = s.ints[TASKS] - s.ints[LAST]
@@ -90,6 +105,8 @@ def exact(s: Store) -> int:
     u0 = s.high[B, m:] if s.ints[LAST] != 0 else nothing
     natural, scales = s.each[NATURAL, :p], s.each[SCALE, :p]
     flags, bits, slowed = 0, 0, False
+    if s.ints[HELD] != 0 and _set_apart(s, m):
+        b, d = s.high[B_AGAIN, :m], s.high[D_AGAIN, :m]
     for turn in range(3):
         flags = lexicographic(
             rows, b, d, sizes, fits, natural, lower, upper, none, nothing, nothing, u0, active, u, scales, active, none,
@@ -106,7 +123,7 @@ def exact(s: Store) -> int:
             if beyond:
                 bits, s.each[AGAIN, 0] = AGAIN_BIT, 1.0
                 for i in range(m):
-                    s.high[D_AGAIN, i] = 0.0
+                    s.high[D_AGAIN, i] = d[i] if d.shape[0] > 0 else 0.0
                     if i >= firsts[1]:
                         s.high[B_AGAIN, i] = b[i]
                 b, d = s.high[B_AGAIN, :m], s.high[D_AGAIN, :m]
@@ -116,7 +133,7 @@ def exact(s: Store) -> int:
         # a task with no feasible scale is slowed
         bits, again_fits, slowed = AGAIN_BIT, index_in(s).again, True
         for i in range(m):
-            s.high[B_AGAIN, i], s.high[D_AGAIN, i] = b[i], 0.0
+            s.high[B_AGAIN, i], s.high[D_AGAIN, i] = b[i], d[i] if d.shape[0] > 0 else 0.0
         b, d = s.high[B_AGAIN, :m], s.high[D_AGAIN, :m]
         for k in range(p):
             again_fits[k] = fits[k]
@@ -200,8 +217,8 @@ def by_ranks(s: Store) -> int:
 
 
 @lean_part
-def made(s: Store, t: float) -> None:
-    """Keep what lasts of a step made at time t; the clock of a path goes on by the share that was delivered."""
+def made(s: Store, v: FloatArray, t: float) -> None:
+    """Keep what lasts of a step made at time t, velocity v; a path's clock goes on by the share that was delivered."""
     count, first = s.ints[TASKS], index_in(s).first
     half = s.bent.shape[0] // 2
     for p in range(count):
@@ -222,6 +239,8 @@ def made(s: Store, t: float) -> None:
         s.each[SHARE, p] = s.each[PACE, p] * (clamp(moved / asked, 0.0, 1.0) if asked != 0.0 else 1.0)
     for i in range(half):
         s.bent[half + i] = s.bent[i]
+    if s.ints[HELD] != 0:
+        _looked_on(s, v)
     s.head[BEFORE] = t
     if s.ints[BEGINS] != 0:
         s.ints[BEGINS], s.head[BEGAN] = 0, t
@@ -229,8 +248,25 @@ def made(s: Store, t: float) -> None:
 
 
 @lean_part
+def _looked_on(s: Store, v: FloatArray) -> None:
+    """Whether tasks come nearer: :mod:`cartctl.levels.patience`."""
+    first, waits = index_in(s).first, False
+    for p in range(s.ints[TASKS]):
+        waits = waits or s.each[PATH, p] >= 0.0
+        missed, size = 0.0, 0.0
+        for i in range(first[p], first[p + 1]):
+            missed += s.high[ERROR, i] * s.high[ERROR, i]
+            size += _squared(s.wide[A + i])
+        s.each[MISSED, p], s.each[SIZE, p] = sqrt(missed), max(s.each[NATURAL, p], sqrt(size))
+    if waits:
+        forget(s.patience, s.patience[PATIENCE])
+    else:
+        look_on(s.each[MISSED], s.each[SIZE], v, s.wide[JOINTS : JOINTS + 4], s.head[DT], s.patience)
+
+
+@lean_part
 def told(s: Store, u: FloatArray, out: FloatArray) -> None:
-    """Copy u, and for whoever looks at the step later: bounds, five of ``each``, six of ``high``, A."""
+    """Copy u, and for whoever looks at the step later: bounds, five of ``each``, seven of ``high``, A."""
     n, p, m = s.ints[NV], s.ints[TASKS], s.ints[ROWS]
     for j in range(n):
         u[j] = s.wide[U, j]
@@ -251,7 +287,8 @@ def told(s: Store, u: FloatArray, out: FloatArray) -> None:
         out[a + 3 * m + i] = s.high[B, i]
         out[a + 4 * m + i] = s.high[B_AGAIN, i]
         out[a + 5 * m + i] = s.high[D_AGAIN, i]
-    a += 6 * m
+        out[a + 6 * m + i] = s.high[GIVEN, i]
+    a += 7 * m
     for i in range(m):
         for j in range(n):
             out[a + i * n + j] = s.wide[A + i, j]
@@ -259,4 +296,4 @@ def told(s: Store, u: FloatArray, out: FloatArray) -> None:
 
 def told_size(n: int, p: int, m: int) -> int:
     """How much room a copy of a step takes."""
-    return 2 * n + 5 * p + 6 * m + m * n
+    return 2 * n + 5 * p + 7 * m + m * n

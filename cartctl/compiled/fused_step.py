@@ -63,6 +63,7 @@ class FusedStep:
         if latest != self._latest:  # of any task
             if [task.changes for task in self.tasks] != self._seen:
                 self._expressed = self._take_over()
+                self._store.begin_anew()
             self._latest = latest
         if self._gains:
             for task, row in self._gains:

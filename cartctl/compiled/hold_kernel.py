@@ -24,8 +24,8 @@ from cartctl.levels.calming_kernel import calmed
 from cartctl.levels.left_out import keep
 
 NV, TASKS, LARGEST, COUNT, BOUNDED = at.NV, at.TASKS, at.LARGEST, at.COUNT, at.BOUNDED
-A, JOINTS, LOWER, UPPER, UNIT, ERROR, RATE, BEND, B = (
-    at.A, at.JOINTS, at.LOWER, at.UPPER, at.UNIT, at.ERROR, at.RATE, at.BEND, at.B,
+A, JOINTS, LOWER, UPPER, UNIT, ERROR, RATE, BEND, B, GIVEN = (
+    at.A, at.JOINTS, at.LOWER, at.UPPER, at.UNIT, at.ERROR, at.RATE, at.BEND, at.B, at.GIVEN,
 )  # fmt: skip
 KIND, FITTED, PATH, WAITS, WHOLE, PACE, CALM, PACED, BESIDE, DT = (
     at.KIND, at.FITTED, at.PATH, at.WAITS, at.WHOLE, at.PACE, at.CALM, at.PACED, at.BESIDE, at.DT,
@@ -75,8 +75,8 @@ def _beneath(
     U, Vt, D, stood = np.empty((m, k)), np.empty((k, n)), np.empty((ROWS, k)), np.empty(n)
     back, base, rest = np.empty((m, M)), np.empty(m), np.empty(m)
     error = s.high[ERROR, firsts[p] : firsts[p + 1]]
-    above, asked = s.wide[A : A + M], s.high[B, :M]
-    narrowed(above, asked, J, b, error, joints, lower, upper, dt, size, False, U, Vt, D, back, base, rest, stood)
+    above, others_ask = s.wide[A : A + M], s.high[B, :M]
+    narrowed(above, others_ask, J, b, error, joints, lower, upper, dt, size, False, U, Vt, D, back, base, rest, stood)
     q = 0
     for i in range(k):
         if D[ASKED, i] != 0.0:
@@ -87,7 +87,14 @@ def _beneath(
             for j in range(p + 1):
                 _bends(s, j, Vt[i], own[:, q] if j == p else others[firsts[j] : firsts[j + 1], q])
             q += 1
-    return held_beneath(error, base, rest, U, Vt, D, joints, back, own, others, dt, size, True, True, b)
+    asked = b.copy()
+    edge = held_beneath(error, base, rest, U, Vt, D, joints, back, own, others, dt, size, True, True, b)
+    held = False
+    for i in range(m):
+        held = held or b[i] != asked[i]
+    for i in range(m):
+        s.high[GIVEN, firsts[p] + i] = base[i] if held else 0.0
+    return edge
 
 
 @lean_part
@@ -113,6 +120,8 @@ def hold_back(s: Store) -> None:
         first, last = firsts[p], firsts[p + 1]
         J, b, edge = s.wide[A + first : A + last], s.high[B, first:last], inf
         s.each[PACE, p], s.each[CALM, p] = 1.0, 0.0
+        for i in range(first, last):
+            s.high[GIVEN, i] = 0.0
         if first == last:
             continue
         fitted = s.each[FITTED, p] != 0.0

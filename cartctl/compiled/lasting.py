@@ -15,7 +15,7 @@ class Memory(NamedTuple):
 
     anchors: what each task holds on to, None before the first step. started: when that was. times: each task's own at
     the last step. delays, shares, paces: of the clocks. last: when the last step was. bent: how the arm was bent,
-    (nv,) or None.
+    (nv,) or None. patience: the state of :class:`cartctl.levels.patience.Patience`, None where nobody looks on.
     """
 
     anchors: list[Any] | None
@@ -26,6 +26,7 @@ class Memory(NamedTuple):
     paces: list[float]
     last: float | None
     bent: list[FloatArray | None]
+    patience: FloatArray | None
 
 
 class Lasting:
@@ -72,7 +73,9 @@ class Lasting:
         bent = [row[:nv].copy() if row[nv] else None for row in kept]
         started = store.floats.item(at.BEGAN) if begun else None
         delays, shares, paces = (each[row].tolist() for row in (at.DELAY, at.SHARE, at.PACED))
-        return Memory(self.anchors, started, self.step_times or [], delays, shares, paces, last, bent)
+        return Memory(
+            self.anchors, started, self.step_times or [], delays, shares, paces, last, bent, s.patience.copy()
+        )
 
     def resume(self, memory: Memory) -> None:
         """Go on from where the general way has come to."""
@@ -92,6 +95,8 @@ class Lasting:
                     row[9:], row[:9] = anchor.position, anchor.rotation.ravel()
                 else:
                     store.high[at.FOUND, store.first[k] : store.first[k + 1]] = anchor
+        if memory.patience is not None:
+            s.patience[:] = memory.patience
         both = s.bent.reshape(2, p, nv + 1)
         for k, motion in enumerate(memory.bent):
             if motion is not None:

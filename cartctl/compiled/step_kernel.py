@@ -22,10 +22,10 @@ def _begun(s: Store) -> None:
 
 
 @lean_part
-def _ended(s: Store, t: float, bits: int, outcome: int, u: FloatArray, out: FloatArray) -> int:
+def _ended(s: Store, v: FloatArray, t: float, bits: int, outcome: int, u: FloatArray, out: FloatArray) -> int:
     """Nothing is kept of a step that failed where somebody else will answer it, who then wants a copy."""
     if outcome & 15 != FAILED or out.shape[0] == 0:
-        made(s, t)
+        made(s, v, t)
         if out.shape[0] > 0:
             told(s, u, out)
     return BITS * bits + outcome
@@ -47,7 +47,7 @@ def step_sns(
     if ints[HELD] != 0:
         hold_back(s)
     _begun(s)
-    return _ended(s, t, bits, exact(s), u, out)
+    return _ended(s, v, t, bits, exact(s), u, out)
 
 
 @kernel("int(out_int_store, out_store, vector, vector, float, out_store, out_store)", fast=True, lean=True)
@@ -60,7 +60,7 @@ def step_dls(
     if BITS * bits & LEFT or ints[LOOKS] != 0:
         return BITS * bits
     _begun(s)
-    return _ended(s, t, bits, least_squares(s, index_in(s).first), u, out)
+    return _ended(s, v, t, bits, least_squares(s, index_in(s).first), u, out)
 
 
 @kernel("int(out_int_store, out_store, vector, vector, float, out_store, out_store)", fast=True, lean=True)
@@ -73,4 +73,4 @@ def step_ranks(
     if BITS * bits & LEFT or ints[LOOKS] != 0:
         return BITS * bits
     _begun(s)
-    return _ended(s, t, bits, by_ranks(s), u, out)
+    return _ended(s, v, t, bits, by_ranks(s), u, out)

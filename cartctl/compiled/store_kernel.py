@@ -13,6 +13,8 @@ from cartctl.compiled.approach_kernel import Room
 from cartctl.compiled.motion_kernel import Chain
 from cartctl.kernels import lean_part
 from cartctl.levels.approach_kernel import ROWS as DIRECTION_ROWS
+from cartctl.levels.patience_kernel import HEAD as PATIENCE_HEAD
+from cartctl.levels.patience_kernel import PATIENCE, forget
 
 # the integers' head
 NQ, NV, TASKS, ROWS, LARGEST, BOUNDED, HELD, LAST, BEGINS, COUNT, SOLVER, STEPS = 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11
@@ -23,23 +25,10 @@ DT, PARAMETER, BEFORE, START, BEGAN, SIX, HEAD = 0, 1, 2, 3, 4, 5, 11
 # rows of ``wide``, nv each: 11 of the limits, 4 of the approach, then
 LIMITS, JOINTS, U, AT, LOWER, UPPER, X, STOOD, J, A = 0, 11, 15, 16, 17, 18, 19, 20, 21, 27
 # rows of ``high``, one column a row of a task
-POINT, FOUND, GAIN, UNIT, TURNING, ERROR, RATE, BEND, B, B_AGAIN, D_AGAIN, HIGH = 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11
+POINT, FOUND, GAIN, UNIT, TURNING, ERROR, RATE, BEND, B, B_AGAIN, D_AGAIN, GIVEN, HIGH = range(13)
 # rows of ``each``, one column a task
 KIND, COUNTED, FITTED, WEIGHT, OPEN_POSITION, OPEN_ROTATION, PATH, WAITS, WHOLE = 0, 1, 2, 3, 4, 5, 6, 7, 8
-NATURAL, PACE, SCALE, DELAY, SHARE, OWN, AGAIN, MADE, CURVED, CALM, PACED, EACH = (
-    9,
-    10,
-    11,
-    12,
-    13,
-    14,
-    15,
-    16,
-    17,
-    18,
-    19,
-    20,
-)
+NATURAL, PACE, SCALE, DELAY, SHARE, OWN, AGAIN, MADE, CURVED, CALM, PACED, MISSED, SIZE, EACH = range(9, 23)
 SAMPLE, CURVE = 25, 24  # numbers of a path's sample, and of a curve whose samples are worked out here
 BESIDE = DIRECTION_ROWS + 3  # rows of ``square`` between two matrices and the memories of the singular vectors
 
@@ -57,6 +46,7 @@ class Store(NamedTuple):
     samples: FloatArray  # (SAMPLE p,)
     curves: FloatArray  # (CURVE p,)
     bent: FloatArray  # (2 p (nv + 1),) how the arm was bent, then the same before this step
+    patience: FloatArray  # (PATIENCE_HEAD + 3 p,) as levels.patience_kernel has it
 
 
 class Index(NamedTuple):
@@ -84,6 +74,7 @@ def opened(ints: IntArray, floats: FloatArray) -> Store:
     e = d + EACH * p
     f = e + SAMPLE * p
     g = f + CURVE * p
+    h = g + 2 * p * (n + 1)
     return Store(
         ints,
         floats[:HEAD],
@@ -94,14 +85,15 @@ def opened(ints: IntArray, floats: FloatArray) -> Store:
         floats[d:e].reshape((EACH, p)),
         floats[e:f],
         floats[f:g],
-        floats[g:],
+        floats[g:h],
+        floats[h:],
     )
 
 
 def sizes(n: int, p: int, m: int, r: int) -> tuple[int, int]:
     """How long the two arrays are."""
     floats = HEAD + 12 * (2 * n + 4 * p + 1) + (A + m + 3 * r) * n + (2 * r + BESIDE + 2 * p * r) * r
-    floats += HIGH * m + (EACH + SAMPLE + CURVE) * p + 2 * p * (n + 1)
+    floats += HIGH * m + (EACH + SAMPLE + CURVE) * p + 2 * p * (n + 1) + PATIENCE_HEAD + 3 * p
     return INTS_HEAD + 5 * n + 2 + 5 * p + 1 + m, floats
 
 
@@ -175,6 +167,7 @@ def forgotten(s: Store) -> None:
         s.each[DELAY, k], s.each[SHARE, k], s.each[PACE, k], s.each[PACED, k] = 0.0, 1.0, 1.0, 1.0
     for i in range(s.bent.shape[0]):
         s.bent[i] = 0.0
+    forget(s.patience, s.patience[PATIENCE])
 
 
 @lean_part

@@ -65,7 +65,8 @@ class Told:
         n, m = self._nv, self._m
         a = 2 * n + 5 * self._p + 3 * m
         b, b_again, d_again = (out[a + i * m : a + (i + 1) * m] for i in range(3))
-        A, natural = out[a + 3 * m :].reshape(m, n), self._of_tasks(out, 1).tolist()
+        given = out[a + 3 * m : a + 4 * m]
+        A, natural = out[a + 4 * m :].reshape(m, n), self._of_tasks(out, 1).tolist()
         again = self._of_tasks(out, 3) if outcome & AGAIN_BIT else [0.0] * self._p
         calm = self._of_tasks(out, 4).tolist()
         equations: list[Equation] = []
@@ -77,6 +78,8 @@ class Told:
                 for e in equations:
                     above.add(e.A, b[: e.A.shape[0]], calm[k])
                 asked = above.calmed(A[i:j], asked, (out[:n], out[n : 2 * n]) if self._bounded else None)
+            if given[i:j].any():
+                asked, drift = asked - given[i:j], -given[i:j]
             if again[k]:
                 asked, drift = b_again[i:j], d_again[i:j] if k == 0 else None
                 fit = "scale" if k == 0 else "least_squares"

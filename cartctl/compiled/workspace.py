@@ -15,6 +15,8 @@ from cartctl.compiled.answer_kernel import DLS, SNS, STATUSES, TASK_PRIORITY
 from cartctl.compiled.plan_kernel import FRAME, JOINTS
 from cartctl.compiled.tree import AT, KIND, PARENT, PLACE, tree_of
 from cartctl.errors import UnsupportedProblem
+from cartctl.levels.patience import patience_of
+from cartctl.levels.patience_kernel import PATIENCE, forget
 from cartctl.model.robot import Robot
 from cartctl.solvers import Solver, dls, sns
 from cartctl.solvers.exact.kinds import FITTED, SCALED
@@ -82,6 +84,7 @@ class Workspace:
             s.wide[at.LIMITS : at.LIMITS + 11] = packed
         if joints is not None:
             s.wide[at.JOINTS : at.JOINTS + 4] = joints
+            s.patience[PATIENCE] = patience_of(joints)
         self.first = np.cumsum([0, *counts])
         index_.first[:] = self.first
         index_.counts[:] = counts
@@ -129,6 +132,10 @@ class Workspace:
             _, points = task.fixed_target(self.robot)
             each[at.OPEN_POSITION, k] = points is None
             self.high[at.POINT, own] = 0.0 if points is None else points
+
+    def begin_anew(self) -> None:
+        """Look anew whether the tasks come nearer, for they are others."""
+        forget.compiled(self.store.patience, self.store.patience[PATIENCE])
 
     def rank(self) -> None:
         """Whether the lowest of several tasks is a posture of all joints: fitting it is to stay near it, as near u0.

@@ -28,4 +28,4 @@ from cartctl.levels.bounds import JointBounds
 class AccelerationBounds(JointBounds):
     """Bounds on the acceleration of the next step; ``q`` and ``v`` are those at its beginning."""
 
-    _at_acceleration: ClassVar[bool] = True
+    at_acceleration: ClassVar[bool] = True

@@ -49,7 +49,7 @@ from cartctl.levels.approach_kernel import (
     hold,
     is_beyond,
 )
-from cartctl.levels.beneath import Means, hold_beneath
+from cartctl.levels.beneath import Beneath, Means, hold_beneath
 from cartctl.levels.beneath_kernel import held_beneath, narrowed
 from cartctl.levels.calming import Above
 from cartctl.levels.calming_kernel import calmed
@@ -60,7 +60,7 @@ from cartctl.solvers import Solver
 from cartctl.tasks.base import Reference, Task
 
 _SHARE = 0.5  # of the acceleration limits: what one direction may count on
-_AT_REST = 1e-6  # of the velocity limit: a bound this close to zero blocks
+_AT_REST = 1e-5  # of the velocity limit: a bound this close to zero blocks
 _BENT = 1e-3  # of the Jacobian's size: above this singular value it is clear how an arm is bent
 _THROUGH = 0.1  # rad: an edge as near can be gone through, what its curvature says of one farther away is not so
 _BENDS = 0.5  # of what one direction may count on: what a path's bends may take, so that it can also slow down
@@ -70,11 +70,15 @@ _NOTHING = np.zeros(0)
 
 
 class Approached(NamedTuple):
-    """b (m,); the calm left to what ranks below; the share of its rate at which a path that can wait is followed."""
+    """b (m,); the calm left to what ranks below; the share of its rate at which a path that can wait is followed.
+
+    given: (m,) what of b is not its own but the motion's above it, None where that need not be told apart.
+    """
 
     b: FloatArray
     calm: float
     pace: float
+    given: FloatArray | None = None
 
 
 class Walls(NamedTuple):
@@ -159,22 +163,20 @@ class Approach:
 
     def command(self, task: Task, state: State, J: FloatArray, reference: Reference, b: FloatArray) -> Approached:
         """``b`` (m,) held back along directions in which the robot could not stop in time."""
-        edge, pace = math.inf, 1.0
+        edge, pace, given = math.inf, 1.0, None
         if J.shape[0] and task.fit == "scale":
-            b, edge, pace = self._held(task, state, J, reference, b)
-            b, beneath = self._beneath(state, task, J, reference, b)
+            b, edge, pace, _ = self._held(task, state, J, reference, b)
+            b, beneath, given = self._beneath(state, task, J, reference, b)
             edge = min(edge, beneath)
         b = self._above.calmed(J, b, self._box)
         self._above.add(J, b, edge, task)
-        return Approached(b, self._above.calm, pace)
+        return Approached(b, self._above.calm, pace, given)
 
-    def _beneath(
-        self, state: State, task: Task, J: FloatArray, reference: Reference, b: FloatArray
-    ) -> tuple[FloatArray, float]:
-        """``b`` held back before the edge of what the tasks above leave to it, and the calm left below."""
+    def _beneath(self, state: State, task: Task, J: FloatArray, reference: Reference, b: FloatArray) -> Beneath:
+        """``b`` held back before the edge of what the tasks above leave to it."""
         above = self._above
         if reference.rate is not None or not above.ranked or above.is_empty:
-            return b, math.inf
+            return Beneath(b, math.inf, None)
         walls = self._walls.box()
         means = Means(self._joints, walls.lower, walls.upper, self._dt, self._scales, self._fenced)
         return hold_beneath(above, task, state, J, b, reference.error, scale(J), means, self._box)

@@ -5,6 +5,10 @@ from losing it: a hand in place that cannot turn any further. What is left of b 
 ask for is held back along the singular directions of J N, as :mod:`cartctl.levels.approach` does it along those of J.
 On the way the tasks above bend, too: along a motion v in their null space, ``h = J_dot(v) v - J A# A_dot(v) v``.
 
+Where anything is held back, the task asks for ``J u - g = s (b - g)``, g what the motion above does to it: slowed down
+as a whole, it still leaves that as it is. ``J u = s b`` would ask others to undo part of g, which at the edge they
+cannot: s = 0 in one step and 1 in the next, by the sign of what is left of g.
+
 That is for targets at rest and solvers that rank tasks; one that weighs them takes what they ask as it is.
 """
 
@@ -21,6 +25,14 @@ from cartctl.levels.calming import Above
 from cartctl.levels.left_out import keep
 from cartctl.model.state import State
 from cartctl.tasks.base import Task
+
+
+class Beneath(NamedTuple):
+    """b (m,) held back, the speed left to what ranks below (inf far from the edge), and g (m,), None if b is whole."""
+
+    b: FloatArray
+    edge: float
+    given: FloatArray | None
 
 
 class Means(NamedTuple):
@@ -44,8 +56,8 @@ def hold_beneath(
     size: float,
     means: Means,
     box: tuple[FloatArray, FloatArray] | None,
-) -> tuple[FloatArray, float]:
-    """``b`` (m,) held back, and the speed that is left to what ranks below (inf far from the edge).
+) -> Beneath:
+    """``b`` (m,) held back, and what comes of it.
 
     box: where joints are kept at their bounds, for a solver that does not scale.
     """
@@ -68,4 +80,4 @@ def hold_beneath(
     )
     if box is not None and not scales and is_beyond(edge, D, k, size):
         keep(stood, *box)
-    return out, edge
+    return Beneath(out, edge, base if base.any() and (out != b).any() else None)

@@ -46,7 +46,7 @@ class JointBounds:
     Raises ParameterError for limits that no joint can keep, TimeStepError, ShapeError.
     """
 
-    _at_acceleration: ClassVar[bool]
+    at_acceleration: ClassVar[bool]
 
     def __init__(
         self,
@@ -76,11 +76,11 @@ class JointBounds:
             raise ShapeError(f"q and v have shapes {q.shape} and {v.shape}; expected {self._shape} each")
         lower, upper = np.empty(self._shape), np.empty(self._shape)
         if not self.jerk:
-            recovering = self._kernel(q, v, self._packed, self.dt, self._at_acceleration, lower, upper)
+            recovering = self._kernel(q, v, self._packed, self.dt, self.at_acceleration, lower, upper)
             return Bounds(lower, upper, recovering)
         if self._before is None:
             self._before = np.array(v)
-        recovering = self._kernel(q, v, self._before, self._packed, self.dt, self._at_acceleration, lower, upper)
+        recovering = self._kernel(q, v, self._before, self._packed, self.dt, self.at_acceleration, lower, upper)
         self._before[:] = v
         return Bounds(lower, upper, recovering)
 

@@ -84,14 +84,16 @@ class Steering(Approach):
         J = task.jacobian(at)
         Jv = J @ at.v
         y = Jv + dt * (given.b - given.drift)
-        held, edge = y, math.inf
+        held, edge, apart = y, math.inf, None
         if J.shape[0] and task.fit == "scale":
             reference = task.reference(at, t, anchor)
             held, edge = self._held_back(task, reference, J, y)
-            held, beneath = self._beneath(at, task, J, reference, held)
+            held, beneath, apart = self._beneath(at, task, J, reference, held)
             edge = min(edge, beneath)
         held = self._above.calmed(J, held, self._box)
         self._above.add(J, held, edge, task)
+        if apart is not None:
+            return Steered(J, (held - apart) / dt, (Jv - apart) / dt)
         return given if held is y or held.tolist() == y.tolist() else Steered(J, held / dt, Jv / dt)
 
     def _held_back(self, task: Task, reference: Reference, J: FloatArray, y: FloatArray) -> tuple[FloatArray, float]:

@@ -52,11 +52,13 @@ class VelocityLevel(Level):
             if reference.rate is not None:
                 b = b + reference.rate
             require_finite(b, f"the command of task {task.name!r}")
-            J, size = task.jacobian(state), task.size(state)
+            J, size, drift = task.jacobian(state), task.size(state), None
             if approach is not None:
-                b, _, pace = approach.command(task, state, J, reference, b)
+                b, _, pace, given = approach.command(task, state, J, reference, b)
+                if given is not None:
+                    b, drift = b - given, -given
                 reference = reference if pace == 1.0 else reference._replace(pace=pace)
-            equations.append(Equation.trusted(J, b, None, task.fit, task.weight, task.name, size))
+            equations.append(Equation.trusted(J, b, drift, task.fit, task.weight, task.name, size))
             references.append(reference)
         objective = secondary.objective
         if objective is None:

@@ -24,4 +24,4 @@ from cartctl.levels.bounds import JointBounds
 class VelocityBounds(JointBounds):
     """Bounds on the velocity of the next step; ``v`` is the velocity of the last one."""
 
-    _at_acceleration: ClassVar[bool] = False
+    at_acceleration: ClassVar[bool] = False

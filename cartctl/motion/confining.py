@@ -18,13 +18,14 @@ from cartctl.levels.base import UNCONFINED, Confines
 from cartctl.levels.bounds import JointBounds
 from cartctl.levels.loads import actuated
 from cartctl.levels.midway import Midway
+from cartctl.levels.patience import Patience
 from cartctl.levels.torque_bounds import torque_box
 from cartctl.levels.yielding import Layer, Widened, intervals, widened
 from cartctl.model.limits import Limits
 from cartctl.model.robot import Robot
 from cartctl.model.state import State
 from cartctl.solvers import Solver, solve, solvers_that_honour
-from cartctl.tasks.base import Task
+from cartctl.tasks.base import Reference, Task
 
 
 class Confining:
@@ -42,12 +43,15 @@ class Confining:
         approach: bool,
         dt: float,
         waiting: Sequence[Task],
+        count: int,
     ) -> None:
+        """waiting: the tasks whose paths wait for the hand. count: of all tasks."""
         self._level, self._dt = level, dt
         self._constraints = _checked(constraints, robot, solver)
         joints = _joints(disabled, robot)
         self._bounds: JointBounds | None = None
         self._approach: Approach | None = None
+        self._patience: Patience | None = None
         self._torque: Box | None = None
         if limits is not None:
             assert level.bounds is not None
@@ -60,6 +64,9 @@ class Confining:
                 _warn_of_rows(solver, level)
             if approach and level.approaching is not None:
                 self._approach = _approach(level.approaching, robot, limits, dt, solver, waiting)
+                if not self._constraints:
+                    accelerates = level.bounds.at_acceleration
+                    self._patience = Patience(self._approach.joints, count, dt, accelerates)
         elif joints or jerk:
             what = "disabled" if joints else "jerk"
             raise ParameterError(f"{what} is given without limits; expected limits= for it to be a part of")
@@ -82,6 +89,8 @@ class Confining:
             self._bounds.reset()
         if self._approach is not None:
             self._approach.reset()
+        if self._patience is not None:
+            self._patience.forget()
 
     def prepare(self) -> None:
         """Compile ahead what the first step would otherwise wait for."""
@@ -92,10 +101,33 @@ class Confining:
         """How the arm was bent before, by task."""
         return [None] * len(tasks) if self._approach is None else self._approach.bends(tasks)
 
-    def resume(self, tasks: Sequence[Task], bends: Sequence[FloatArray | None]) -> None:
+    @property
+    def patience(self) -> FloatArray | None:
+        """What is known of whether the tasks come nearer, None where nobody looks on."""
+        return None if self._patience is None else self._patience.state.copy()
+
+    def resume(self, tasks: Sequence[Task], bends: Sequence[FloatArray | None], patience: FloatArray | None) -> None:
         """Go on from what another way has come to."""
         if self._approach is not None:
             self._approach.resume(tasks, bends)
+        if self._patience is not None and patience is not None:
+            self._patience.resume(tasks, patience)
+
+    def look_on(
+        self,
+        tasks: Sequence[Task],
+        references: Sequence[Reference],
+        equations: Sequence[Equation],
+        v: FloatArray,
+        alone: bool,
+    ) -> None:
+        """Take note of a step made at velocity v, to see whether the tasks come nearer; alone: with no objective."""
+        if self._patience is None:
+            return
+        if alone:
+            self._patience.look_on(tasks, references, equations, v)
+        else:
+            self._patience.forget()
 
     def compiled(self) -> tuple[FloatArray | None, FloatArray | None]:
         """Limits (11, nv) and the approach's figures of the joints (3, nv), None without; raises UnsupportedProblem."""
@@ -113,6 +145,8 @@ class Confining:
         self.recovering = False
         if self._bounds is not None:
             lower, upper, self.recovering = self._bounds(self._coordinates(state.q), state.v)
+            if self._patience is not None and not self.recovering:
+                self._patience.slow_down(tasks, state.v, lower, upper)
             approach = self._approach
             if approach is not None:
                 approach.go_on(tasks, paces)

@@ -193,7 +193,7 @@ class Controller:
 
     def _confined_by(self, limits: Limits | None) -> Confining:
         given = (self._constraints, self._disabled, self._jerk, self._approach)
-        return Confining(self.robot, self.level, self.solver, limits, *given, self.dt, self._waiting)
+        return Confining(self.robot, self.level, self.solver, limits, *given, self.dt, self._waiting, len(self.tasks))
 
     def _fused_way(self) -> FusedTorque | None:
         """Level and solver in one, where there is such a way for them; else they are asked one after the other."""
@@ -217,7 +217,7 @@ class Controller:
 
     def _hand_over(self, stroke: FusedStep) -> None:
         """Let that way go on from where the general one has come to."""
-        lasting = (*self._clocks.kept, self._confining.bends(self.tasks))
+        lasting = (*self._clocks.kept, self._confining.bends(self.tasks), self._confining.patience)
         stroke.lasting.resume(Memory(self._anchors, self._started, self._step_times, *lasting))
         self._ahead = True
 
@@ -231,7 +231,7 @@ class Controller:
         if memory.anchors is not None:
             self._step_times = memory.times
         self._clocks.resume(memory.delays, memory.shares, memory.paces, memory.last)
-        self._confining.resume(self.tasks, memory.bent)
+        self._confining.resume(self.tasks, memory.bent, memory.patience)
 
     @property
     def step_times(self) -> list[float]:
@@ -306,6 +306,8 @@ class Controller:
         self._step_times = times
         if self._waiting:
             self._clocks.tick(t, times, references, problem.equations, solution.u, self.tasks)
+        if found is None:
+            self._confining.look_on(self.tasks, references, problem.equations, state.v, self.objective is None)
         return self.level.command(solution, references, state)
 
     @property
