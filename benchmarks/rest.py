@@ -24,7 +24,7 @@ sys.path.insert(0, str(Path(__file__).parent.parent))
 from tests import test_coming_to_rest as rest
 
 RESULTS = Path(__file__).parent / "results" / "rest.csv"
-DIRECTIONS = {"position": 20, "pose": 10, "ranked": 10, "pose+posture": 10, "in place": 10}
+DIRECTIONS = {"position": 20, "pose": 10, "ranked": 10, "pose+posture": 10, "in place": 20}
 ROBOTS = ("panda", "lwr", "kinova")
 VERDICTS = ("at_rest", "later", "nearing", "moving")
 WORTH = 1e-4  # m or rad: a miss that changed by less in two seconds did not

@@ -107,7 +107,7 @@ def test_least_squares_leaves_the_circle_and_keeps_the_clock():
 @PLAIN
 def test_a_target_that_jumps(solver, limits):
     found = figures("jump", solver, limits)
-    assert found.own()["settled_s"] <= (1.4 if solver == "hqp" else 1.2)
+    assert found.own()["settled_s"] <= 1.2
     assert found.speeds[-1] <= 1e-9
 
 

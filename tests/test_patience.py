@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import cartctl as cc
-from cartctl.levels.patience import PATIENCE, patience_of
-from cartctl.levels.patience_kernel import HEAD, IDLE, SHARE, forget, look_on, slow_down
+from cartctl.levels.patience import PATIENCE, patience_of, size_of
+from cartctl.levels.patience_kernel import IDLE, SHARE, STEP, forget, look_on, slow_down
 from cartctl.motion.integrate import advance
 from tests.test_beneath import at_the_end
 from tests.test_coming_to_rest import FORMS, STANDS, arm, in_place, limits_of, rolled, stack
@@ -20,14 +20,16 @@ JOINTS = np.array([[10.0, 10.0], [2.0, 0.5], [1e-5, 1e-5], [1.0, 1.0]])  # as in
 
 
 def fresh(count=1):
-    state = np.empty(HEAD + 3 * count)
-    forget.compiled(state, PATIENCE)
+    state = np.zeros(size_of(count, 2))
+    forget.compiled(state, count, PATIENCE)
     return state
 
 
-def note(state, missed, share=1.0, size=1.0):
+def note(state, missed, share=1.0, size=1.0, off=0.0):
+    """A step at the given share of the speeds; off: (2,) from where the step before was to lead."""
     missed = np.atleast_1d(np.asarray(missed, dtype=float))
-    look_on.compiled(missed, np.full(len(missed), size), share * JOINTS[1], JOINTS, DT, state)
+    x = state[-2:] + off
+    look_on.compiled(missed, np.full(len(missed), size), x, share * JOINTS[1] * DT, JOINTS, DT, state)
 
 
 # ---------------------------------------------------------------- the arithmetic
@@ -45,23 +47,29 @@ def test_who_does_not_is_slowed_down_from_what_it_moves_at():
     state = fresh()
     note(state, 1.0)
     for k in range(1000):
-        note(state, 1.0 + 0.01 * (-1) ** k, share=0.25)
-        slowed = state[IDLE] > PATIENCE
-        assert (state[SHARE] < 1.0) == slowed and state[SHARE] <= (0.25 if slowed else 1.0)
-    assert state[SHARE] == 1e-9
+        share = min(0.25, state[SHARE])
+        note(state, 1.0 + 0.004 * share * (-1) ** k, share=share)
+        if state[SHARE] < 1.0:
+            assert state[SHARE] < 0.25 and k >= round(PATIENCE / DT)
+    assert state[SHARE] == 5e-7
 
 
 def test_it_returns_while_that_leads_nearer():
     state = fresh()
     for _ in range(300):
-        note(state, 1.0, share=0.25)
-    missed, before = 1.0, state[SHARE]
-    assert before < 0.05
-    for _ in range(300):  # 3 s
-        missed -= 2e-3
-        note(state, missed, share=state[SHARE] * 0.5)
-        assert state[SHARE] >= before
-    assert state[SHARE] == pytest.approx(np.e * before, rel=1e-2)
+        note(state, 1.0, share=min(0.25, state[SHARE]))
+    missed = 1.0
+    assert state[SHARE] < 0.05
+    for steepness, seconds in ((0.01, 3.0), (0.1, 0.5)):
+        for _ in range(60):  # what it had been idle for
+            missed -= steepness * state[STEP]
+            note(state, missed, share=state[SHARE] * 0.5)
+        before = state[SHARE]
+        for _ in range(round(seconds / DT)):
+            missed -= steepness * state[STEP]
+            note(state, missed, share=state[SHARE] * 0.5)
+            assert state[SHARE] >= before
+        assert state[SHARE] == pytest.approx(np.e * before, rel=1e-2)
 
 
 def test_who_has_arrived_may_move():
@@ -81,12 +89,19 @@ def test_to_stand_is_not_to_be_idle():
 def test_what_somebody_else_does_begins_anew():
     state = fresh(2)
     for _ in range(500):
-        note(state, [1.0, 2.0])
+        note(state, [1.0, 2.0], share=state[SHARE])
     assert state[SHARE] < 1e-3
-    note(state, [1.0, 2.005], share=0.0)
+    note(state, [1.0, 2.0005], share=0.0)
     assert state[SHARE] < 1e-3
-    note(state, [1.0, 2.02], share=0.0)
+    note(state, [1.0, 2.0015], share=0.0)
     assert state[SHARE] == 1.0
+    for _ in range(200):
+        note(state, [1.0, 2.0])
+    note(state, [1.0, 2.5])  # a push while it still moves: the way back counts from there
+    assert state[IDLE] == 0.0
+    for k in range(1000):
+        note(state, [1.0, 2.5 - 4e-4 * k])
+        assert state[SHARE] == 1.0
 
 
 def test_a_task_below_begins_anew_where_one_above_comes_nearer():
@@ -104,18 +119,15 @@ def test_a_task_below_begins_anew_where_one_above_comes_nearer():
 @settings(max_examples=50, deadline=None)
 @given(st.integers(0, 2**32 - 1), st.floats(1.0, 100.0), st.floats(0.0, 2.0))
 def test_every_way_is_bounded(seed, size, steepness):
-    """``||e|| / (1e-3 ||J||)``, and what patience takes, however the misses come about."""
-    rng, state, way, missed, last = np.random.default_rng(seed), fresh(), 0.0, 3.0, 0.0
+    """Of a task that swings about its best: what patience takes, and no more."""
+    rng, state, way, best = np.random.default_rng(seed), fresh(), 0.0, 3.0
     speed = float(np.linalg.norm(JOINTS[1]))
-    for k in range(4000):
+    for _ in range(2000):
         share = state[SHARE]
-        missed = abs(missed + share * size * speed * DT * rng.normal(-steepness * 1e-3, 0.01))
-        before = state[HEAD]
-        note(state, max(missed, 2e-4 * size), share=share, size=size)
+        swing = share * size * speed * DT * abs(rng.normal(0.0, 0.1 + steepness))
+        note(state, best + min(swing, share * size * speed * DT), share=share, size=size)
         way += share * speed * DT
-        if state[HEAD] < before:
-            last = k
-    assert way <= 3.0 / (1e-3 * size) + speed * (PATIENCE + 0.1 + 2.0 * DT) * (1.0 + 4000 * DT / 3.0) or last > 3000
+    assert way <= speed * (PATIENCE + 1.0)
 
 
 @settings(max_examples=200, deadline=None)
@@ -163,13 +175,13 @@ def standing(found):
         ("kinova", "hqp", 1, 12),
         ("panda", "qp", 0, 0),
         ("lwr", "qp", 1, 1),
-        ("kinova", "qp", 2, 3),
+        ("kinova", "qp", 2, 1),
     ],
 )
 def test_who_swung_for_ever_stands(name, solver, form, seed):
     """A position in reach, an orientation that is not, there."""
     robot = arm(name)
-    standing(rolled(robot, stack(robot, "ranked", in_place(robot, seed)), solver, *FORMS[form], duration=16.0))
+    standing(rolled(robot, stack(robot, "ranked", in_place(robot, seed)), solver, *FORMS[form], duration=24.0))
 
 
 @pytest.mark.parametrize("level, accelerations", FORMS)
@@ -259,10 +271,10 @@ def test_at_one_stroke_as_in_the_general_way():
 
 def test_many_at_once_as_one_by_one():
     controller, robot = restless()
-    one = cc.simulate(controller, robot.home, duration=8.0)
-    many = cc.simulate_batch(restless()[0], np.array([robot.home, robot.home]), duration=8.0, history=True)
+    one = cc.simulate(controller, robot.home, duration=16.0)
+    many = cc.simulate_batch(restless()[0], np.array([robot.home, robot.home]), duration=16.0, history=True)
     np.testing.assert_allclose(many.q[1], one.q, atol=1e-12)
-    assert np.abs(one.v[-1] / robot.limits.velocity_upper).max() <= 1e-2
+    assert np.abs(one.v[-1] / robot.limits.velocity_upper).max() <= STANDS
 
 
 # ---------------------------------------------------------------- who is not slowed down

@@ -29,9 +29,9 @@ _BEYOND = 1e-6  # of a command: a part as large that cannot be obeyed
 NV, TASKS, ROWS, BOUNDED, HELD, LAST, BEGINS, COUNT = (
     at.NV, at.TASKS, at.ROWS, at.BOUNDED, at.HELD, at.LAST, at.BEGINS, at.COUNT,
 )  # fmt: skip
-A, U, X, JOINTS, LOWER, UPPER, B, B_AGAIN, D_AGAIN, GIVEN, HIGH, ERROR, RATE, BEND = (
-    at.A, at.U, at.X, at.JOINTS, at.LOWER, at.UPPER, at.B, at.B_AGAIN, at.D_AGAIN, at.GIVEN, at.HIGH, at.ERROR, at.RATE,
-    at.BEND,
+A, U, AT, X, JOINTS, LOWER, UPPER, B, B_AGAIN, D_AGAIN, GIVEN, HIGH, ERROR, RATE, BEND = (
+    at.A, at.U, at.AT, at.X, at.JOINTS, at.LOWER, at.UPPER, at.B, at.B_AGAIN, at.D_AGAIN, at.GIVEN, at.HIGH, at.ERROR,
+    at.RATE, at.BEND,
 )  # fmt: skip
 WEIGHT, FITTED, WAITS, NATURAL, PACE, SCALE, DELAY, SHARE, OWN, AGAIN, MADE, PATH, CALM, PACED, MISSED, SIZE = (
     at.WEIGHT, at.FITTED, at.WAITS, at.NATURAL, at.PACE, at.SCALE, at.DELAY, at.SHARE, at.OWN, at.AGAIN, at.MADE,
@@ -217,8 +217,8 @@ def by_ranks(s: Store) -> int:
 
 
 @lean_part
-def made(s: Store, v: FloatArray, t: float) -> None:
-    """Keep what lasts of a step made at time t, velocity v; a path's clock goes on by the share that was delivered."""
+def made(s: Store, t: float) -> None:
+    """Keep what lasts of a step made at time t; the clock of a path goes on by the share that was delivered."""
     count, first = s.ints[TASKS], index_in(s).first
     half = s.bent.shape[0] // 2
     for p in range(count):
@@ -240,7 +240,7 @@ def made(s: Store, v: FloatArray, t: float) -> None:
     for i in range(half):
         s.bent[half + i] = s.bent[i]
     if s.ints[HELD] != 0:
-        _looked_on(s, v)
+        _looked_on(s)
     s.head[BEFORE] = t
     if s.ints[BEGINS] != 0:
         s.ints[BEGINS], s.head[BEGAN] = 0, t
@@ -248,7 +248,7 @@ def made(s: Store, v: FloatArray, t: float) -> None:
 
 
 @lean_part
-def _looked_on(s: Store, v: FloatArray) -> None:
+def _looked_on(s: Store) -> None:
     """Whether tasks come nearer: :mod:`cartctl.levels.patience`."""
     first, waits = index_in(s).first, False
     for p in range(s.ints[TASKS]):
@@ -259,9 +259,12 @@ def _looked_on(s: Store, v: FloatArray) -> None:
             size += _squared(s.wide[A + i])
         s.each[MISSED, p], s.each[SIZE, p] = sqrt(missed), max(s.each[NATURAL, p], sqrt(size))
     if waits:
-        forget(s.patience, s.patience[PATIENCE])
-    else:
-        look_on(s.each[MISSED], s.each[SIZE], v, s.wide[JOINTS : JOINTS + 4], s.head[DT], s.patience)
+        forget(s.patience, s.ints[TASKS], s.patience[PATIENCE])
+        return
+    for j in range(s.ints[NV]):
+        s.wide[X, j] = s.head[DT] * s.wide[U, j]
+    joints = s.wide[JOINTS : JOINTS + 4]
+    look_on(s.each[MISSED], s.each[SIZE], s.wide[AT], s.wide[X], joints, s.head[DT], s.patience)
 
 
 @lean_part

@@ -62,12 +62,16 @@ class FusedStep:
         latest = Task.latest
         if latest != self._latest:  # of any task
             if [task.changes for task in self.tasks] != self._seen:
+                before = self._store.asked()
                 self._expressed = self._take_over()
-                self._store.begin_anew()
+                if self._store.asked() != before:
+                    self._store.begin_anew()
             self._latest = latest
         if self._gains:
             for task, row in self._gains:
-                row[:] = task.gain
+                if (row != task.gain).any():
+                    row[:] = task.gain
+                    self._store.begin_anew()
         if not self._expressed or (self._paths and not self._sample(t)):
             return None
         ints, floats = self._arrays

@@ -19,15 +19,13 @@ from cartctl.compiled.motion_kernel import (
 from cartctl.compiled.plan_kernel import FRAME
 from cartctl.compiled.store_kernel import Store, chain_in, index_in, own_times
 from cartctl.kernels import lean_part
-from cartctl.levels.patience_kernel import SHARE, slow_down
 from cartctl.levels.velocity_kernel import velocity_bounds
 
 REFUSED, ASTRAY, RECOVERING = 1, 2, 4  # bits of what looking may come to
 _UNIT = 0.99e-6  # how far a (cos, sin) pair may be from unit norm; a little less than what a robot accepts
 
-(NV, TASKS, ROWS, BOUNDED, BEGINS, HELD, AT, J, A, LIMITS, JOINTS, LOWER, UPPER) = (
-    at.NV, at.TASKS, at.ROWS, at.BOUNDED, at.BEGINS, at.HELD, at.AT, at.J, at.A, at.LIMITS, at.JOINTS, at.LOWER,
-    at.UPPER,
+(NV, TASKS, ROWS, BOUNDED, BEGINS, AT, J, A, LIMITS, LOWER, UPPER) = (
+    at.NV, at.TASKS, at.ROWS, at.BOUNDED, at.BEGINS, at.AT, at.J, at.A, at.LIMITS, at.LOWER, at.UPPER,
 )  # fmt: skip
 (POINT, FOUND, GAIN, UNIT, TURNING, ERROR, RATE, BEND, B) = (
     at.POINT, at.FOUND, at.GAIN, at.UNIT, at.TURNING, at.ERROR, at.RATE, at.BEND, at.B,
@@ -134,7 +132,4 @@ def look(s: Store, q: FloatArray, v: FloatArray, t: float) -> int:
         limits = s.wide[LIMITS : LIMITS + 11]
         if velocity_bounds(s.wide[AT], v, limits, s.head[DT], False, s.wide[LOWER], s.wide[UPPER]):
             return RECOVERING
-        if s.ints[HELD] != 0 and s.patience[SHARE] < 1.0:
-            joints, share = s.wide[JOINTS : JOINTS + 4], s.patience[SHARE]
-            slow_down(v, joints, share, s.head[DT], False, s.wide[LOWER], s.wide[UPPER])
     return 0

@@ -38,7 +38,7 @@ def _stepped(s: Store, ints: IntArray, floats: FloatArray, q: FloatArray, v: Flo
             s.wide[U, j] = 0.0
         for p in range(ints[TASKS]):
             s.each[SCALE, p] = 1.0
-        made(s, v, t)
+        made(s, t)
         return FAILED
     status = found & 15
     return RECOVERING if found & (BITS * _RECOVERING) != 0 and status != FAILED else status

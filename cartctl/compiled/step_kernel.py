@@ -6,13 +6,15 @@ from cartctl.checks import FloatArray, IntArray
 from cartctl.compiled import store_kernel as at
 from cartctl.compiled.answer_kernel import FAILED, by_ranks, exact, least_squares, made, told
 from cartctl.compiled.hold_kernel import hold_back
-from cartctl.compiled.look_kernel import ASTRAY, REFUSED, look
+from cartctl.compiled.look_kernel import ASTRAY, RECOVERING, REFUSED, look
 from cartctl.compiled.store_kernel import Store, index_in, opened
 from cartctl.kernels import kernel, lean_part
+from cartctl.levels.patience_kernel import SHARE, slow_down
 
 OUTCOME, BITS = 63, 64  # what a step returns: its status and the bits beside that, and times BITS those of looking
 LEFT = BITS * (REFUSED | ASTRAY)
 TASKS, HELD, LOOKS, SCALE, AGAIN = at.TASKS, at.HELD, at.LOOKS, at.SCALE, at.AGAIN
+JOINTS, LOWER, UPPER, DT = at.JOINTS, at.LOWER, at.UPPER, at.DT
 
 
 @lean_part
@@ -22,10 +24,10 @@ def _begun(s: Store) -> None:
 
 
 @lean_part
-def _ended(s: Store, v: FloatArray, t: float, bits: int, outcome: int, u: FloatArray, out: FloatArray) -> int:
+def _ended(s: Store, t: float, bits: int, outcome: int, u: FloatArray, out: FloatArray) -> int:
     """Nothing is kept of a step that failed where somebody else will answer it, who then wants a copy."""
     if outcome & 15 != FAILED or out.shape[0] == 0:
-        made(s, v, t)
+        made(s, t)
         if out.shape[0] > 0:
             told(s, u, out)
     return BITS * bits + outcome
@@ -46,8 +48,11 @@ def step_sns(
         return BITS * bits
     if ints[HELD] != 0:
         hold_back(s)
+        if bits & RECOVERING == 0 and s.patience[SHARE] < 1.0:
+            joints = s.wide[JOINTS : JOINTS + 4]
+            slow_down(v, joints, s.patience[SHARE], s.head[DT], False, s.wide[LOWER], s.wide[UPPER])
     _begun(s)
-    return _ended(s, v, t, bits, exact(s), u, out)
+    return _ended(s, t, bits, exact(s), u, out)
 
 
 @kernel("int(out_int_store, out_store, vector, vector, float, out_store, out_store)", fast=True, lean=True)
@@ -60,7 +65,7 @@ def step_dls(
     if BITS * bits & LEFT or ints[LOOKS] != 0:
         return BITS * bits
     _begun(s)
-    return _ended(s, v, t, bits, least_squares(s, index_in(s).first), u, out)
+    return _ended(s, t, bits, least_squares(s, index_in(s).first), u, out)
 
 
 @kernel("int(out_int_store, out_store, vector, vector, float, out_store, out_store)", fast=True, lean=True)
@@ -73,4 +78,4 @@ def step_ranks(
     if BITS * bits & LEFT or ints[LOOKS] != 0:
         return BITS * bits
     _begun(s)
-    return _ended(s, v, t, bits, by_ranks(s), u, out)
+    return _ended(s, t, bits, by_ranks(s), u, out)

@@ -46,7 +46,7 @@ class Store(NamedTuple):
     samples: FloatArray  # (SAMPLE p,)
     curves: FloatArray  # (CURVE p,)
     bent: FloatArray  # (2 p (nv + 1),) how the arm was bent, then the same before this step
-    patience: FloatArray  # (PATIENCE_HEAD + 3 p,) as levels.patience_kernel has it
+    patience: FloatArray  # (PATIENCE_HEAD + 3 p + nv,) as levels.patience_kernel has it
 
 
 class Index(NamedTuple):
@@ -93,7 +93,7 @@ def opened(ints: IntArray, floats: FloatArray) -> Store:
 def sizes(n: int, p: int, m: int, r: int) -> tuple[int, int]:
     """How long the two arrays are."""
     floats = HEAD + 12 * (2 * n + 4 * p + 1) + (A + m + 3 * r) * n + (2 * r + BESIDE + 2 * p * r) * r
-    floats += HIGH * m + (EACH + SAMPLE + CURVE) * p + 2 * p * (n + 1) + PATIENCE_HEAD + 3 * p
+    floats += HIGH * m + (EACH + SAMPLE + CURVE) * p + 2 * p * (n + 1) + PATIENCE_HEAD + 3 * p + n
     return INTS_HEAD + 5 * n + 2 + 5 * p + 1 + m, floats
 
 
@@ -167,7 +167,7 @@ def forgotten(s: Store) -> None:
         s.each[DELAY, k], s.each[SHARE, k], s.each[PACE, k], s.each[PACED, k] = 0.0, 1.0, 1.0, 1.0
     for i in range(s.bent.shape[0]):
         s.bent[i] = 0.0
-    forget(s.patience, s.patience[PATIENCE])
+    forget(s.patience, p, s.patience[PATIENCE])
 
 
 @lean_part

@@ -6,16 +6,17 @@ take turns at their limits, or a task is asked by those above to give up what it
 promises what a tour of many steps never holds, and robots swing to and fro for ever. So somebody looks on.
 
 A task comes nearer when its miss ``||e||`` falls below the least before by 1e-3 of ``||J||`` times the way the joints
-went since, ``integral ||v|| dt``; what ranks below it then begins anew. If none does for 2.5 s, and half the time in
-which the joints can stop, while they move, their speed limits are narrowed to a share that falls to 1/e in 0.1 s, from
-what they move at; it rises again, e times in 3 s, while that brings a task nearer. What counts is joint motion and not
-time, so that to be slow is not to be idle; and the way of a robot is bounded: ``||e|| / (1e-3 ||J||)`` for each time a
-task begins. Steps get shorter until they lead downhill, as those of a trust region do (Conn, Gould & Toint 2000,
-"Trust-region methods"); the merit is the tasks' misses in their order.
+went since; what ranks below it then begins anew. If none does for as long as patience lasts, while the joints move,
+their speed limits are narrowed to a share that falls to 1/e in 0.1 s, from what they move at; what counts as nearer is
+measured from there, and anew for each 0.4 of a share. It rises again, e times in 0.5 s to 3 s, while that brings a task
+nearer. Patience lasts for 2.5 s, or 4 rad at full speed, and the time in which the joints can stop. Steps get shorter
+until they lead downhill, as those of a trust region do (Conn, Gould & Toint 2000, "Trust-region methods"); the merit is
+the tasks' misses in their order.
 
-It is for tasks of frames and joints at rest, without an objective and without constraints, for those may have reasons of
-their own to move. A task that is changed, limits that are assigned, a reset, or a miss that changes by 1e-2 of ``||J||``
-more than the robot itself can have moved it, begin anew.
+It is for tasks of frames and joints at rest, without an objective and without constraints, for those may have reasons
+of their own to move, and while the robot does what it is told, to 30 % of each step. A task that is changed, limits
+that are assigned, a reset, or a miss that changes by 1e-3 of ``||J||`` more than the robot itself can have moved it,
+begin anew. Within 1e-4 of ``||J||`` of all targets nobody is slowed down.
 """
 
 from __future__ import annotations
@@ -24,21 +25,30 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from cartctl.algebra.problem import Equation
+from cartctl.algebra.problem import Problem
 from cartctl.algebra.svd import norm, scale
 from cartctl.checks import FloatArray
 from cartctl.levels.approach_kernel import SLOWING, TOP_SPEED
 from cartctl.levels.patience_kernel import HEAD, SHARE, forget, look_on, slow_down
+from cartctl.model.state import State
 from cartctl.tasks import FrameTask, JointTask, PostureTask
 from cartctl.tasks.base import Reference, Task
 
-PATIENCE = 2.5  # s
+PATIENCE, WAY = 2.5, 4.0  # s; rad at full speed
 
 
 def patience_of(joints: FloatArray) -> float:
     """How long a robot may get no nearer, s: joints (4, nv) as :attr:`cartctl.levels.approach.Approach.joints`."""
-    brakes = np.isfinite(joints[SLOWING]) & np.isfinite(joints[TOP_SPEED]) & (joints[SLOWING] > 0.0)
-    return PATIENCE + float(np.max(0.5 * joints[TOP_SPEED, brakes] / joints[SLOWING, brakes], initial=0.0))
+    slowing, top = joints[SLOWING], joints[TOP_SPEED]
+    fastest = float(np.max(top[np.isfinite(top)], initial=0.0))
+    brakes = np.isfinite(slowing) & np.isfinite(top) & (slowing > 0.0)
+    stops = float(np.max(0.5 * top[brakes] / slowing[brakes], initial=0.0))
+    return max(PATIENCE, WAY / fastest if fastest > 0.0 else 0.0) + stops
+
+
+def size_of(count: int, nv: int) -> int:
+    """How many numbers last, for that many tasks."""
+    return HEAD + 3 * count + nv
 
 
 class Patience:
@@ -46,43 +56,63 @@ class Patience:
 
     def __init__(self, joints: FloatArray, count: int, dt: float, at_acceleration: bool) -> None:
         self._joints, self._dt, self._at_acceleration = joints, dt, at_acceleration
-        self._patience = patience_of(joints)
+        self._patience, self._count = patience_of(joints), count
         self._changes: list[int] = []
-        self.state = np.empty(HEAD + 3 * count)
+        self._asked: list[bytes] = []
+        self.state = np.zeros(size_of(count, joints.shape[1]))
         self.forget()
 
     def forget(self) -> None:
         """As before the first step."""
-        forget.compiled(self.state, self._patience)
+        forget.compiled(self.state, self._count, self._patience)
 
-    def _unchanged(self, tasks: Sequence[Task]) -> bool:
-        """Whether the tasks are those of the step before; begins anew if not."""
-        changes = [task.changes for task in tasks]
-        if changes != self._changes:
-            self._changes = changes
-            self.forget()
-            return False
-        return True
-
-    def slow_down(self, tasks: Sequence[Task], v: FloatArray, lower: FloatArray, upper: FloatArray) -> None:
-        """Narrow the box on u, each (nv,), where no task came nearer; v (nv,): the velocity."""
-        if self.state[SHARE] < 1.0 and self._unchanged(tasks):
-            share = float(self.state[SHARE])
-            slow_down.compiled(v, self._joints, share, self._dt, self._at_acceleration, lower, upper)
+    def slow_down(self, tasks: Sequence[Task], state: State, problem: Problem) -> None:
+        """Narrow the box of the problem at a state where no task came nearer, in place."""
+        if self.state[SHARE] < 1.0 and not self._others(tasks, state):
+            assert problem.lower is not None and problem.upper is not None
+            box = (problem.lower, problem.upper)
+            slow_down.compiled(state.v, self._joints, float(self.state[SHARE]), self._dt, self._at_acceleration, *box)
 
     def look_on(
-        self, tasks: Sequence[Task], references: Sequence[Reference], equations: Sequence[Equation], v: FloatArray
+        self, tasks: Sequence[Task], references: Sequence[Reference], problem: Problem, state: State, u: FloatArray
     ) -> None:
-        """Take note of a step that was made at velocity v (nv,)."""
-        self._unchanged(tasks)
+        """Take note of a step that was made at a state, u (nv,)."""
+        self._others(tasks, state)
         if not all(type(task) in (FrameTask, JointTask, PostureTask) and task.rests for task in tasks):
             self.forget()
             return
         missed = np.array([norm(reference.error) for reference in references])
-        sizes = np.array([max(e.size, scale(e.A)) for e in equations[: len(tasks)]])
-        look_on.compiled(missed, sizes, v, self._joints, self._dt, self.state)
+        sizes = np.array([max(e.size, scale(e.A)) for e in problem.equations[: len(tasks)]])
+        step = self._dt * ((state.v + 0.5 * self._dt * u) if self._at_acceleration else u)
+        x = state.robot.coordinates(state.q)
+        look_on.compiled(missed, sizes, x, step, self._joints, self._dt, self.state)
+
+    def _others(self, tasks: Sequence[Task], state: State) -> bool:
+        """Whether the tasks ask for something else than in the step before; begins anew then."""
+        changes = [task.changes for task in tasks]
+        if changes == self._changes:
+            return False
+        self._changes, before = changes, self._asked
+        self._asked = [_asked(task, state) for task in tasks]
+        if self._asked == before:
+            return False
+        self.forget()
+        return True
 
     def resume(self, tasks: Sequence[Task], state: FloatArray) -> None:
         """Go on from another one's :attr:`state`."""
-        self._changes = [task.changes for task in tasks]
+        self._changes, self._asked = [task.changes for task in tasks], []
         self.state[:] = state
+
+
+def _asked(task: Task, state: State) -> bytes:
+    """What a task asks for; that of a path, and of tasks of others, is never the same."""
+    parts: list[FloatArray | None] = [np.array([task.weight, task.fit == "scale"]), np.atleast_1d(task.gain)]
+    if type(task) is FrameTask and task.path is None:
+        goal = task.goal(0.0)
+        parts += [goal.position, goal.rotation]
+    elif type(task) in (JointTask, PostureTask) and task.rests:
+        parts.append(task.fixed_target(state.robot)[1])  # type: ignore[attr-defined]
+    else:
+        parts.append(np.array([float(task.changes)]))
+    return b"|".join(b"open" if part is None else np.asarray(part).tobytes() for part in parts)

@@ -117,17 +117,23 @@ class Confining:
         self,
         tasks: Sequence[Task],
         references: Sequence[Reference],
-        equations: Sequence[Equation],
-        v: FloatArray,
-        alone: bool,
+        problem: Problem,
+        state: State,
+        u: FloatArray,
     ) -> None:
-        """Take note of a step made at velocity v, to see whether the tasks come nearer; alone: with no objective."""
-        if self._patience is None:
-            return
-        if alone:
-            self._patience.look_on(tasks, references, equations, v)
-        else:
+        """Take note of a step that was made, to see whether the tasks come nearer."""
+        if self._patience is not None:
+            self._patience.look_on(tasks, references, problem, state, u)
+
+    def look_away(self) -> None:
+        """Forget what was seen: an objective has reasons of its own to move."""
+        if self._patience is not None:
             self._patience.forget()
+
+    def slow_down(self, tasks: Sequence[Task], problem: Problem, state: State) -> None:
+        """Narrow the problem's box, in place, where no task came nearer."""
+        if self._patience is not None and not self.recovering:
+            self._patience.slow_down(tasks, state, problem)
 
     def compiled(self) -> tuple[FloatArray | None, FloatArray | None]:
         """Limits (11, nv) and the approach's figures of the joints (3, nv), None without; raises UnsupportedProblem."""
@@ -145,8 +151,6 @@ class Confining:
         self.recovering = False
         if self._bounds is not None:
             lower, upper, self.recovering = self._bounds(self._coordinates(state.q), state.v)
-            if self._patience is not None and not self.recovering:
-                self._patience.slow_down(tasks, state.v, lower, upper)
             approach = self._approach
             if approach is not None:
                 approach.go_on(tasks, paces)

@@ -60,7 +60,8 @@ class Controller:
     constraints: Constraints such as ``cc.FrameBox(...)``. disabled: names of joints that brake and stand still. jerk:
     whether ``limits.jerk_*`` are kept, too. path_clock: whether a path waits for a hand that is slowed down, so that it
     stays on its path; by default where the solver scales, at the velocity level. approach: whether commands are held
-    back, under limits, so that the robot can stop at its target, at the edge of its reach and at the constraints.
+    back, under limits, so that the robot can stop at its target, at the edge of its reach and at the constraints, and
+    whether a robot that gets no nearer to targets at rest slows down until it does (:mod:`cartctl.levels.patience`).
     singularity: what becomes of a task near a singularity of its own Jacobian, whatever the solver: ``"truncate"``,
     ``"damp"``, ``"slow-down"``, ``"avoid"``, ``"halt"``, an inverse policy such as ``cc.Damped(0.05)``,
     ``cc.SlowDown(0.1)``, ``cc.AvoidSingularity(2.0)``, ``cc.Halt(0.02)``, or None: the solver's own business. Where a
@@ -292,6 +293,10 @@ class Controller:
             found = self._fused.answer(state, times, anchors, secondary, confines, self._last)
         if found is None:
             problem, references = self.level.problem(state, self.tasks, times, anchors, secondary, metric, confines)
+            if self.objective is None:
+                self._confining.slow_down(self.tasks, problem, state)
+            else:
+                self._confining.look_away()
             left, guarded, halted = self._guard.guard(problem, state)
             solution = self._halt(left, state) if halted else self._solve(left, state, self._last)
             close = midway is not None and not halted and midway.concerns(left, solution.u)
@@ -306,8 +311,8 @@ class Controller:
         self._step_times = times
         if self._waiting:
             self._clocks.tick(t, times, references, problem.equations, solution.u, self.tasks)
-        if found is None:
-            self._confining.look_on(self.tasks, references, problem.equations, state.v, self.objective is None)
+        if found is None and self.objective is None:
+            self._confining.look_on(self.tasks, references, problem, state, solution.u)
         return self.level.command(solution, references, state)
 
     @property
