@@ -345,3 +345,69 @@ def test_a_path_is_followed_however_long_it_takes():
     controller = cc.Controller(robot, cc.FrameTask(robot.tool, "position", target=circle), "sns", dt=DT)
     run_on(controller, robot, robot.home, np.zeros(7), 1000)
     assert share_of(controller) == 1.0
+
+
+@pytest.mark.parametrize("kind", [cc.Controller, General])
+def test_the_way_back_from_a_push_is_as_long_as_it_is(kind):
+    """A low gain; far from the nearest it ever was, for long."""
+    robot = arm("panda")
+    tasks = [cc.FrameTask(robot.tool, target=robot.state(robot.home).placement(robot.tool), gain=0.5), cc.PostureTask()]
+    controller = kind(robot, tasks, "sns", dt=DT)
+    q, v = run_on(controller, robot, robot.home, np.zeros(7), 100)
+    q, v = run_on(controller, robot, robot.integrate(q, [0.6, 0.3, -0.3, 0.3, 0.3, 0.0, 0.0]), v, 3000, begin=100)
+    assert share_of(controller) == 1.0
+    assert np.linalg.norm(controller.step(q, v, 31.0).references[0].error) <= 1e-6
+
+
+@pytest.mark.parametrize("seed", [9, 17, 20])
+def test_a_detour_to_a_target_in_reach_is_made(seed):
+    """The LWR turns the wrong way first, for seconds."""
+    robot = arm("lwr")
+    tasks = stack(robot, "ranked", in_place(robot, seed), gain=10.0)
+    controller = cc.Controller(robot, tasks, "sns", limits=limits_of(robot, True), dt=2e-2)
+    run = cc.simulate(controller, robot.home, duration=30.0)
+    assert max(np.linalg.norm(task.error[-1]) for task in run.tasks) <= 1e-3
+
+
+@pytest.mark.parametrize("seconds", [2.0, 4.0, 10.0])
+def test_a_robot_that_was_held_starts_where_it_is(seconds):
+    """Brakes on, and the velocity that is told handed back as if it moved."""
+    robot = arm("panda")
+    target = robot.state(robot.home).position(robot.tool) + [0.1, 0.1, 0.1]
+    controller = cc.Controller(robot, cc.FrameTask(robot.tool, "position", target=target, gain=3.0), "sns", dt=DT)
+    q, v, begin = robot.home, np.zeros(7), round(seconds / DT)
+    for k in range(begin):
+        v = controller.step(q, v, k * DT).velocity
+    q, v = run_on(controller, robot, q, np.zeros(7), 600, begin=begin)
+    assert np.linalg.norm(robot.state(q).position(robot.tool) - target) <= 1e-6
+
+
+def test_a_hand_is_held_against_what_others_do():
+    """The first joint is turned by somebody else; a steady lag is not idleness."""
+    robot, misses = arm("panda"), []
+    hand = cc.FrameTask(robot.tool, target=robot.state(robot.home).placement(robot.tool), gain=5.0)
+    controller = cc.Controller(robot, hand, "sns", disabled=["panda_joint1"], dt=DT)
+    q, v = robot.home, np.zeros(7)
+    for k in range(1500):
+        command = controller.step(q, v, k * DT)
+        misses.append(np.linalg.norm(command.references[0].error))
+        v = command.velocity.copy()
+        v[0] = 0.05 * np.sin(2.0 * np.pi * k * DT / 12.0)
+        q = robot.integrate(q, DT * v)
+        v[0] = 0.0
+    assert share_of(controller) == 1.0 and max(misses) <= 0.02
+
+
+@pytest.mark.parametrize("kind", [cc.Controller, General])
+@pytest.mark.parametrize("again", [True, False])
+def test_no_velocity_given_and_the_same_target_again(kind, again):
+    controller, robot = restless(kind)
+    q, targets = robot.home, [task.target for task in controller.tasks]
+    for k in range(1600):
+        if again:
+            for task, target in zip(controller.tasks, targets, strict=True):
+                task.target = np.array(target)
+        command = controller.step(q, None, k * DT)
+        q = robot.integrate(q, DT * command.velocity)
+    assert share_of(controller) < 1e-3
+    assert np.abs(command.velocity / robot.limits.velocity_upper).max() <= STANDS
