@@ -62,6 +62,10 @@ class Patience:
         self.state = np.zeros(size_of(count, joints.shape[1]))
         self.forget()
 
+    def prepare(self) -> None:
+        """Compile ahead what the first steps would otherwise wait for."""
+        _ = look_on.compiled, slow_down.compiled
+
     def forget(self) -> None:
         """As before the first step."""
         forget.compiled(self.state, self._count, self._patience)

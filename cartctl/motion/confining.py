@@ -96,6 +96,8 @@ class Confining:
         """Compile ahead what the first step would otherwise wait for."""
         if self._approach is not None:
             self._approach.prepare()
+        if self._patience is not None:
+            self._patience.prepare()
 
     def bends(self, tasks: Sequence[Task]) -> list[FloatArray | None]:
         """How the arm was bent before, by task."""
