@@ -18,7 +18,7 @@ from cartctl.compiled.store_kernel import (
     straightened,
 )
 from cartctl.kernels import lean_part, part
-from cartctl.levels.approach_kernel import ASKED, ROWS
+from cartctl.levels.approach_kernel import ASKED, ROWS, is_beyond
 from cartctl.levels.beneath_kernel import held_beneath, narrowed
 from cartctl.levels.calming_kernel import calmed
 from cartctl.levels.left_out import keep
@@ -89,9 +89,9 @@ def _beneath(
             q += 1
     asked = b.copy()
     edge = held_beneath(error, base, rest, U, Vt, D, joints, back, own, others, dt, size, True, True, b)
-    held = False
+    held, lost = False, is_beyond(inf, D, k, size)
     for i in range(m):
-        held = held or b[i] != asked[i]
+        held = held or (lost and b[i] != asked[i])
     for i in range(m):
         s.high[GIVEN, firsts[p] + i] = base[i] if held else 0.0
     return edge
