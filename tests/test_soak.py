@@ -198,3 +198,14 @@ def test_a_line_is_appended(soaking, tmp_path):
     assert row["problems"] == "10" and row["problems_per_s"] == "40" and row["steps"] == str(loops.STEPS)
     tally.append(tmp_path / "soak.csv", {"other": "columns"})
     assert (tmp_path / "soak.old.csv").exists() and (tmp_path / "soak.csv").read_text() == "other\ncolumns\n"
+
+
+@pytest.mark.xfail(
+    reason="open: an axis parallel but for 5e-12, and a warm start that stays where only round-off holds it"
+)
+def test_a_warm_start_beside_parallel_axes(soaking):
+    """Found by soaking: from a cold start the same problem is answered to 5e-14, and nothing says UNPROVEN."""
+    from soaking import rollouts
+
+    found, _ = rollouts.run(98001, 510000, 0.0)
+    assert not found.failures

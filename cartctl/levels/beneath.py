@@ -5,9 +5,9 @@ from losing it: a hand in place that cannot turn any further. What is left of b 
 ask for is held back along the singular directions of J N, as :mod:`cartctl.levels.approach` does it along those of J.
 On the way the tasks above bend, too: along a motion v in their null space, ``h = J_dot(v) v - J A# A_dot(v) v``.
 
-Where a direction of J N is lost, the task asks for ``J u - g = s (b - g)``, g what the motion above does to it: slowed
-down as a whole, it still leaves that as it is. ``J u = s b`` would ask others to undo part of g, which they cannot: s is
-0 in one step and 1 in the next, by the sign of what is left of g.
+Where a direction of J N is lost, the task asks for ``J u - g = s (b - g)``, g what the motion above does to it:
+slowed down as a whole, it still leaves that as it is. ``J u = s b`` would ask others to undo part of g, which they
+cannot: s is 0 in one step and 1 in the next, by the sign of what is left of g.
 
 That is for targets at rest and solvers that rank tasks; one that weighs them takes what they ask as it is.
 """
