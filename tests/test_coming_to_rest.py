@@ -22,14 +22,18 @@ FORMS = [("velocity", False), ("velocity", True), ("acceleration", True)]  # lev
 
 
 class Rolled(NamedTuple):
-    """q (N+1, n) coordinates, shares (N, n) of the speed limits, hand's error at the end, worst excess of a limit."""
+    """q (N+1, n) coordinates, shares (N, n) of the speed limits, worst excess of a limit."""
 
     q: np.ndarray
     shares: np.ndarray
-    error: float
     excess: float
     deadline: float  # s: no arm gets from the first to the last posture sooner, plus REST
     misses: np.ndarray  # (N, p) how far each task is from its target
+
+    @property
+    def error(self):
+        """The hand's at the end."""
+        return self.misses[-1, 0]
 
 
 @cache
@@ -94,7 +98,7 @@ def rolled(robot, tasks, solver, level, accelerations, duration=None, **options)
         excess = max(excess, float(np.max(over)))
     fastest = float(np.max(np.abs(x[-1] - x[0]) / limits.velocity_upper))
     ramp = float(np.max(limits.velocity_upper / limits.acceleration_upper))
-    return Rolled(np.array(x), np.array(shares), misses[-1][0], excess, fastest + ramp + REST, np.array(misses))
+    return Rolled(np.array(x), np.array(shares), excess, fastest + ramp + REST, np.array(misses))
 
 
 def reversals(shares):

@@ -22,6 +22,7 @@ from cartctl.compiled.step_kernel import BITS, LEFT, OUTCOME, step_dls, step_ran
 from cartctl.compiled.told import FusedCommand, Told
 from cartctl.compiled.workspace import Workspace
 from cartctl.errors import UnsupportedProblem
+from cartctl.levels.patience import asked_of
 from cartctl.tasks import FrameTask, Task
 
 _FLOAT = np.dtype(np.float64)
@@ -45,6 +46,7 @@ class FusedStep:
         self._nv, self._size = robot.nv, told_size(robot.nv, len(tasks), self._store.rows)
         self._seen, self._latest = [-1] * len(tasks), -1
         self._expressed = self._take_over()
+        self._asked = asked_of(tasks, robot)
 
     def step(self, q: Any, v: Any, t: Any) -> FusedCommand | None:
         """The command, or None where the general way is to be taken: nothing is kept of such a step.
@@ -62,9 +64,9 @@ class FusedStep:
         latest = Task.latest
         if latest != self._latest:  # of any task
             if [task.changes for task in self.tasks] != self._seen:
-                before = self._store.asked()
                 self._expressed = self._take_over()
-                if self._store.asked() != before:
+                before, self._asked = self._asked, asked_of(self.tasks, self._robot)
+                if self._asked != before:
                     self._store.begin_anew()
             self._latest = latest
         if self._gains:

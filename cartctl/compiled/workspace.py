@@ -133,12 +133,6 @@ class Workspace:
             each[at.OPEN_POSITION, k] = points is None
             self.high[at.POINT, own] = 0.0 if points is None else points
 
-    def asked(self) -> bytes:
-        """What the tasks ask for, but for paths."""
-        s, n, p = self.store, self.robot.nv, len(self.tasks)
-        rows = (s.high[[at.GAIN, at.POINT]], s.twelve[2 * n + 2 * p : 2 * n + 3 * p])
-        return b"".join(row.tobytes() for row in (*rows, s.each[[at.FITTED, at.WEIGHT, at.OPEN_POSITION, at.PATH]]))
-
     def begin_anew(self) -> None:
         """Look anew whether the tasks come nearer, for they are others."""
         forget.compiled(self.store.patience, len(self.tasks), self.store.patience[PATIENCE])

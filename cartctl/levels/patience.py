@@ -30,6 +30,7 @@ from cartctl.algebra.svd import norm, scale
 from cartctl.checks import FloatArray
 from cartctl.levels.approach_kernel import SLOWING, TOP_SPEED
 from cartctl.levels.patience_kernel import HEAD, SHARE, forget, look_on, slow_down
+from cartctl.model.robot import Robot
 from cartctl.model.state import State
 from cartctl.tasks import FrameTask, JointTask, PostureTask
 from cartctl.tasks.base import Reference, Task
@@ -97,7 +98,7 @@ class Patience:
         if changes == self._changes:
             return False
         self._changes, before = changes, self._asked
-        self._asked = [_asked(task, state) for task in tasks]
+        self._asked = asked_of(tasks, state.robot)
         if self._asked == before:
             return False
         self.forget()
@@ -109,14 +110,18 @@ class Patience:
         self.state[:] = state
 
 
-def _asked(task: Task, state: State) -> bytes:
-    """What a task asks for; that of a path, and of tasks of others, is never the same."""
+def asked_of(tasks: Sequence[Task], robot: Robot) -> list[bytes]:
+    """What each task asks for, to be compared; changes of a path, and of tasks of others, always count."""
+    return [_asked(task, robot) for task in tasks]
+
+
+def _asked(task: Task, robot: Robot) -> bytes:
     parts: list[FloatArray | None] = [np.array([task.weight, task.fit == "scale"]), np.atleast_1d(task.gain)]
     if type(task) is FrameTask and task.path is None:
         goal = task.goal(0.0)
         parts += [goal.position, goal.rotation]
     elif type(task) in (JointTask, PostureTask) and task.rests:
-        parts.append(task.fixed_target(state.robot)[1])  # type: ignore[attr-defined]
+        parts.append(task.fixed_target(robot)[1])  # type: ignore[attr-defined]
     else:
         parts.append(np.array([float(task.changes)]))
     return b"|".join(b"open" if part is None else np.asarray(part).tobytes() for part in parts)
